@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <set>
 
 #include "dynamics/judge.hpp"
@@ -202,9 +203,11 @@ class Shares {
   explicit Shares(const Account& account)
       : account_(account), squares_(folds_and_held_out(account.choice)), standard_(folds_and_held_out({})) {}
 
-  /// With its interval over folds and held-out rows.
-  Share of(std::size_t at) const {
-    const VectorXd gain = folds_and_held_out(Search::without(account_.choice, at)) - squares_;
+  /// Of these groups together, with its interval over folds and held-out rows. `at`: ascending numbers.
+  Share of(const std::vector<std::size_t>& at) const {
+    Choice rest = account_.choice;
+    for (auto one = at.rbegin(); one != at.rend(); ++one) rest = Search::without(rest, *one);
+    const VectorXd gain = folds_and_held_out(rest) - squares_;
     Share out;
     out.value = gain.sum() / standard_.sum();
     const auto n = static_cast<double>(gain.size());
@@ -230,14 +233,16 @@ class Shares {
   VectorXd squares_, standard_;
 };
 
-std::string at_joints(const std::vector<std::string>& joints) {
+/// `all`: how many joints have a reading.
+std::string at_joints(const std::vector<std::string>& joints, std::size_t all) {
   if (joints.empty()) return "";
+  if (joints.size() > 2 && joints.size() == all) return " at all joints";
   if (joints.size() == 2) return " at " + joints[0] + " from " + joints[1];
   return " at " + listed(joints);
 }
 
-std::string sentence_of(const FoundTorqueEffect& found) {
-  std::string out = found.plain + at_joints(found.joints);
+std::string sentence_of(const FoundTorqueEffect& found, std::size_t joints) {
+  std::string out = found.plain + at_joints(found.joints, joints);
   out[0] = static_cast<char>(std::toupper(out[0]));
   std::vector<std::string> sizes;
   for (const Parameter& p : found.parameters) {
@@ -285,11 +290,104 @@ std::vector<FoundTorqueEffect> standard_effects(const Problem& problem, const Ac
   return out;
 }
 
+/// A group of a choice, by its number there, as it is said.
+struct NamedGroup {
+  FoundTorqueEffect found;
+  std::size_t at;
+};
+
+constexpr std::size_t kOneCause = 3;  ///< joints with the same effect, and more than half of all: one cause
+
+/// Whether the same at many joints has one cause: grease that is cold, rotors that the file lacks. Links differ one by
+/// one, and so do couplings.
+bool may_be_one_cause(const TorqueGroup& group) {
+  return group.joint >= 0 && group.joints.size() == 1 && !is_inertial(group);
+}
+
+/// What could stand in the place of all: the same effect at each of their joints; else what could in that of one.
+std::vector<TorqueAlternative> alternatives_of(const std::vector<const FoundTorqueEffect*>& members,
+                                               const std::vector<std::string>& joints) {
+  std::vector<TorqueAlternative> out;
+  std::map<std::string, std::vector<double>> everywhere;  // by effect, at the joint of the member itself
+  for (const FoundTorqueEffect* member : members) {
+    for (const TorqueAlternative& one : member->confounded_with)
+      if (one.joints == member->joints) everywhere[one.effect].push_back(one.probability);
+  }
+  for (const auto& [effect, each] : everywhere) {
+    if (each.size() < members.size()) continue;
+    out.push_back({effect, joints, *std::min_element(each.begin(), each.end())});
+  }
+  for (const FoundTorqueEffect* member : members) {
+    for (const TorqueAlternative& one : member->confounded_with) {
+      const bool said = std::any_of(out.begin(), out.end(), [&](const TorqueAlternative& other) {
+        return other.effect == one.effect && (other.joints == one.joints || other.joints == joints);
+      });
+      if (!said) out.push_back(one);
+    }
+  }
+  return out;
+}
+
+/// Groups of one effect as one, by joint.
+FoundTorqueEffect as_one(const TorqueDesign& design, const Choice& choice, const Shares& shares,
+                         std::vector<NamedGroup> members) {
+  const auto joint = [&](const NamedGroup& one) { return group_of(design, choice.groups[one.at]).joint; };
+  std::sort(members.begin(), members.end(), [&](const auto& a, const auto& b) { return joint(a) < joint(b); });
+  FoundTorqueEffect out;
+  std::vector<std::size_t> at;
+  std::vector<const FoundTorqueEffect*> each;
+  for (const NamedGroup& one : members) {
+    out.joints.push_back(one.found.joints.front());
+    out.parameters.insert(out.parameters.end(), one.found.parameters.begin(), one.found.parameters.end());
+    out.probability = std::max(out.probability, one.found.probability);
+    out.rms = std::max(out.rms, one.found.rms);
+    if (out.plain.empty()) out.plain = one.found.plain;
+    at.push_back(one.at);
+    if (one.found.probability > 0.0) each.push_back(&one.found);
+  }
+  out.effect = members.front().found.effect;
+  out.standard = members.front().found.standard;
+  std::sort(at.begin(), at.end());
+  out.share = shares.of(at);
+  out.confounded_with = alternatives_of(each, out.joints);
+  return out;
+}
+
+/// One effect of all joints at which groups of a choice are the same, in the place of its surest: as sure as this one.
+/// `more`: those that are too small to be named alone; what is said beside the others leaves them.
+std::vector<FoundTorqueEffect> together(const TorqueDesign& design, const Choice& choice, const Shares& shares,
+                                        std::vector<NamedGroup> named, std::vector<NamedGroup>* more) {
+  std::vector<FoundTorqueEffect> out;
+  std::set<std::string> done;
+  for (const NamedGroup& one : named) {
+    const TorqueGroup& mine = group_of(design, choice.groups[one.at]);
+    if (done.count(mine.effect) > 0 && may_be_one_cause(mine)) continue;
+    const auto same = [&](const NamedGroup& other) {
+      const TorqueGroup& group = group_of(design, choice.groups[other.at]);
+      return may_be_one_cause(group) && group.effect == mine.effect;
+    };
+    std::vector<NamedGroup> members;
+    std::copy_if(named.begin(), named.end(), std::back_inserter(members), same);
+    std::set<std::string> possible;
+    for (const TorqueGroup& group : design.groups)
+      if (group.effect == mine.effect && may_be_one_cause(group)) possible.insert(group.joints.front());
+    if (!may_be_one_cause(mine) || members.size() < kOneCause || 2 * members.size() <= possible.size()) {
+      out.push_back(one.found);
+      continue;
+    }
+    done.insert(mine.effect);
+    std::copy_if(more->begin(), more->end(), std::back_inserter(members), same);
+    more->erase(std::remove_if(more->begin(), more->end(), same), more->end());
+    out.push_back(as_one(design, choice, shares, std::move(members)));
+  }
+  return out;
+}
+
 std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Account& account, const Naming& naming,
                                              const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own,
                                              const std::vector<UnknownTorque>& unknown,
                                              std::vector<std::string>* small) {
-  std::vector<FoundTorqueEffect> out;
+  std::vector<NamedGroup> named, too_small;
   const TorqueDesign& design = *account.design;
   const Choice& choice = account.choice;
   const Shares shares(account);
@@ -300,10 +398,11 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
     found.joints = group.joints;
     found.standard = group.standard && !problem.fitted_before && !account.inertias_given;
     found.parameters = parameters_of(design, group.columns, naming.fit());
-    found.share = shares.of(k);
+    found.share = shares.of({k});
     const double posterior = naming.probability(k, &found.confounded_with);
     if (posterior * naming.not_another_law(k) < kNamed) {
-      small->push_back(group.effect + (group.joints.empty() ? "" : " at " + listed(group.joints)));
+      found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
+      too_small.push_back({std::move(found), k});
       continue;
     }
     const bool beside_unknown = std::any_of(unknown.begin(), unknown.end(), [&](const UnknownTorque& u) {
@@ -313,9 +412,12 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
     if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     found.plain = find_torque_effect(group.effect, own).traits.plain;
-    found.sentence = sentence_of(found);
-    out.push_back(std::move(found));
+    named.push_back({std::move(found), k});
   }
+  std::vector<FoundTorqueEffect> out = together(design, choice, shares, std::move(named), &too_small);
+  for (FoundTorqueEffect& found : out) found.sentence = sentence_of(found, problem.robot.driven_count());
+  for (const NamedGroup& one : too_small)
+    small->push_back(one.found.effect + (one.found.joints.empty() ? "" : " at " + listed(one.found.joints)));
   // By share; but what nobody would have fitted anyway, and is likely, stands before what everybody does.
   const auto news = [&](const FoundTorqueEffect& e) {
     return e.probability >= 0.5 && !find_torque_effect(e.effect, own).traits.usual;
@@ -344,7 +446,7 @@ std::vector<UnknownTorque> unknown_of(const Account& account, const Naming& nami
     UnknownTorque unknown;
     unknown.joint = group.joints.front();
     unknown.inputs = group.inputs;
-    unknown.share = shares.of(k);
+    unknown.share = shares.of({k});
     std::vector<TorqueAlternative> ignored;
     unknown.probability = naming.sure(k, &ignored);
     if (unknown.probability < kUnknown) continue;
@@ -377,7 +479,7 @@ double mean_percent(const TorqueErrors& errors) {
 }
 
 /// What was found, in plain words; and how many more.
-std::string causes_of(const std::vector<FoundTorqueEffect>& effects) {
+std::string causes_of(const std::vector<FoundTorqueEffect>& effects, std::size_t joints) {
   std::string text;
   std::size_t named = 0, more = 0;
   for (const FoundTorqueEffect& e : effects) {
@@ -386,7 +488,7 @@ std::string causes_of(const std::vector<FoundTorqueEffect>& effects) {
       ++more;
       continue;
     }
-    text += (text.empty() ? "" : "; ") + e.plain + at_joints(e.joints);
+    text += (text.empty() ? "" : "; ") + e.plain + at_joints(e.joints, joints);
   }
   return more > 0 ? text + "; and " + std::to_string(more) + " more" : text;
 }
@@ -398,10 +500,10 @@ std::string words_of_usual(const Problem& problem, const Account& account) {
   return "standard practice (inertias, Coulomb and viscous friction, an offset)";
 }
 
-std::string verdict_sentence(const TorqueDiagnosis& d, const std::string& usual) {
+std::string verdict_sentence(const TorqueDiagnosis& d, const std::string& usual, std::size_t joints) {
   const auto percent = [](double value) { return number(value, 2) + " %"; };
   if (d.verdict == Verdict::does_not_hold) return "What was found does not hold on recordings it never saw.";
-  const std::string causes = causes_of(d.effects);
+  const std::string causes = causes_of(d.effects, joints);
   if (!causes.empty()) {
     return "The error of held-out torques falls from " + percent(d.without_names) + ", which " + usual +
            " leaves, to " + percent(mean_percent(d.errors[2])) + " of their standard deviation: " + causes + ".";
@@ -650,7 +752,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
   out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);
-  out.sentence = verdict_sentence(out, words_of_usual(problem, account));
+  out.sentence = verdict_sentence(out, words_of_usual(problem, account), problem.robot.driven_count());
   const std::vector<std::string> worse = worse_joints(out.errors[1], out.errors[2]);
   if (!problem.fitted_before && !worse.empty())
     out.warnings.push_back(

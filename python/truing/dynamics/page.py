@@ -540,20 +540,26 @@ def _causes(result: Mapping[str, Any]) -> str:
         if named
         else "<p>Nothing beyond standard practice was found.</p>"
     )
+    many = [effect for effect in named if len(effect["joints"]) > FEW and len(effect["parameters"]) > FEW]
+    folds = _folded("The values of each joint", many) + _folded("What is usually fitted", usual)
+    return f'<section class="card"><h2>What was found</h2>{table}{folds}</section>'
+
+
+def _folded(title: str, effects: Sequence[Mapping[str, Any]]) -> str:
+    """All parameters of effects, to be unfolded."""
     rows = "".join(
         f'<tr><td>{escaped(plain(e))}</td><td class="wide">{escaped(p["name"])}</td><td class="n">'
         f"{figures_text(p['value'])}</td><td>{_sigma(p)}</td>"
         f"<td>{escaped(p['unit'])}</td></tr>"
-        for e in usual
+        for e in effects
         for p in e["parameters"]
     )
-    fold = (
-        '<details><summary>What is usually fitted</summary><div class="scroll"><table class="causes"><tbody>'
+    return (
+        f'<details><summary>{title}</summary><div class="scroll"><table class="causes"><tbody>'
         f"{rows}</tbody></table></div></details>"
         if rows
         else ""
     )
-    return f'<section class="card"><h2>What was found</h2>{table}{fold}</section>'
 
 
 def _cause_line(effect: Mapping[str, Any]) -> str:
