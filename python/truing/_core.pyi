@@ -7982,8 +7982,10 @@ class ServoWindow:
 class ServoSet:
     """
     Values of the chain of every joint, shape=(joints, fields).
+    
+    charge: integrals of the command error at the first rows of recordings, shape=(recordings, joints); empty: zero.
     """
-    def __init__(self, chain: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], weight_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, bodies: typing.SupportsInt | typing.SupportsIndex = -1, functions: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]]] = [], only: typing.SupportsInt | typing.SupportsIndex = -1) -> None:
+    def __init__(self, chain: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], weight_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, bodies: typing.SupportsInt | typing.SupportsIndex = -1, functions: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]]] = [], only: typing.SupportsInt | typing.SupportsIndex = -1, charge: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...) -> None:
         ...
 class ServoPath:
     """

@@ -61,13 +61,17 @@ class Simulator {
     w_.qpos[arm_.qpos[k]] = angle;
     w_.qvel[dof(k)] = speed;
   }
+  /// What weight and motion ask of every joint where it begins: a step computes it, after which all begin again.
+  void weigh(Index /*row*/) { calls_.step(w_.model, w_.data); }
+  double load(std::size_t k) const { return w_.bias[dof(k)]; }
+  double inertia(std::size_t k) const { return kMovesAlone * w_.inertia_at_zero[dof(k)]; }
   void come(Index /*row*/, double /*part*/) {}
   void look(std::size_t k, ServoMoment* now) const {
     now->angle = angle(k);
     now->speed = w_.qvel[dof(k)];
     now->bias = w_.bias[dof(k)];
     now->rubbed = w_.constraint[dof(k)];
-    now->inertia = kMovesAlone * w_.inertia_at_zero[dof(k)];
+    now->inertia = inertia(k);
   }
   void act(std::size_t k, ServoDrive* drive, const ServoMoment& now) {
     const ServoActs acts = drive->act(now);
@@ -119,6 +123,13 @@ class Apart {
     joints_[k].angle = angle;
     joints_[k].speed = speed;
   }
+
+  void weigh(Index row) { come(row, 0.0); }
+  double load(std::size_t k) const {
+    const Track& t = tracks_[joints_[k].track];
+    return t.now.bias + (joints_[k].weight - 1.0) * t.now.cosine;
+  }
+  double inertia(std::size_t k) const { return tracks_[joints_[k].track].now.inertia; }
 
   /// Where a step begins, `part` of the way from a row to the next.
   void come(Index row, double part) {
@@ -185,16 +196,19 @@ class Apart {
 template <class Bodies>
 class Run {
  public:
-  Run(Bodies* moved, const ServoArm& arm, const ServoRecording& recording, const std::vector<const ServoSet*>& sets)
+  /// number: of the recording.
+  Run(Bodies* moved, const ServoArm& arm, const ServoRecording& recording, int number,
+      const std::vector<const ServoSet*>& sets)
       : moved_(moved), arm_(arm), r_(recording), left_(sets.size(), false), torques_(sets.size(), 0.0) {
     const auto joints = static_cast<Index>(arm.dof.size());
     for (std::size_t k = 0; k < sets.size(); ++k) {
       const Index first = std::max(0, sets[k]->only), end = sets[k]->only < 0 ? joints : sets[k]->only + 1;
-      for (Index j = first; j < end; ++j) lanes_.push_back({ServoDrive(arm, recording, *sets[k], j), k, j});
+      for (Index j = first; j < end; ++j) lanes_.push_back({ServoDrive(arm, recording, *sets[k], number, j), k, j});
     }
     for (const Lane& lane : lanes_) {
       moved->add(lane);
       sags_ = sags_ || lane.drive.sags();
+      rotors_ = rotors_ || lane.drive.has_rotor();
     }
   }
 
@@ -219,13 +233,17 @@ class Run {
  private:
   void begin(Index row) {
     time_ = static_cast<double>(row) * r_.step;
+    for (std::size_t l = 0; l < lanes_.size(); ++l) moved_->begin(l, measured(row, l), r_.speed(row, lanes_[l].joint));
+    if (rotors_) moved_->weigh(row);
+    std::vector<std::pair<double, double>> loads(lanes_.size(), {0.0, 1.0});
+    for (std::size_t l = 0; rotors_ && l < lanes_.size(); ++l) loads[l] = {moved_->load(l), moved_->inertia(l)};
     for (std::size_t l = 0; l < lanes_.size(); ++l) {
-      Lane& lane = lanes_[l];
-      const double angle = r_.position(row, lane.joint) - lane.drive.zero(), speed = r_.speed(row, lane.joint);
-      moved_->begin(l, angle, speed);
-      lane.drive.begin(row, angle, speed);
+      const double speed = r_.speed(row, lanes_[l].joint);
+      const auto [load, inertia] = loads[l];
+      moved_->begin(l, lanes_[l].drive.begin(row, measured(row, l), speed, load, inertia), speed);
     }
   }
+  double measured(Index row, std::size_t l) const { return r_.position(row, lanes_[l].joint) - lanes_[l].drive.zero(); }
 
   /// One step of the simulator, `part` of the way from a row to the next.
   void step(Index row, int number, double part) {
@@ -258,7 +276,7 @@ class Run {
   std::vector<char> left_;       ///< of every set
   std::vector<double> torques_;  ///< of every set, of all its drives, in the step before
   double time_ = 0.0;
-  bool sags_ = false;
+  bool sags_ = false, rotors_ = false;
 };
 
 ServoBodies bodies_of(const ServoWorkspace& w, int bodies) {
@@ -319,6 +337,9 @@ void check(const ServoArm& arm, const std::vector<ServoRecording>& recordings, c
   }
   for (const ServoSet& s : sets) {
     require(s.chain.rows() == joints && s.chain.cols() == kServoFields, "simulate_servos: a chain of another shape");
+    require(
+        s.charge.size() == 0 || (s.charge.rows() == static_cast<Index>(recordings.size()) && s.charge.cols() == joints),
+        "simulate_servos: charges of another shape than (recordings, joints)");
     for (const ServoFunction& f : s.functions)
       require(f.values.size() > 1 && f.width > 0.0, "simulate_servos: a function needs two places or more");
   }
@@ -391,7 +412,7 @@ void run_with_rotors(const ServoTask& task, const std::vector<ServoPiece>& piece
       sets.push_back(&task.sets[pieces[first].set]);
     }
     Apart moved(task.arm, task.recordings[recording], task.paths, recording, sets);
-    Run<Apart> run(&moved, task.arm, task.recordings[recording], sets);
+    Run<Apart> run(&moved, task.arm, task.recordings[recording], static_cast<int>(recording), sets);
     run.window(task.windows[window], task.rows[window], places, task.out);
   }
 }
@@ -456,7 +477,7 @@ ServoMotion simulate_servos(const ServoCalls& calls, const std::vector<ServoWork
       for (int i = 0; i < 3; ++i) w.gravity[i] = sets[set].weight_scale * arm.gravity[i];
       if (sets[set].bodies >= 0) place_bodies(w, bodies[static_cast<std::size_t>(sets[set].bodies)]);
       Simulator moved(calls, w, arm);
-      Run<Simulator> run(&moved, arm, r, {&sets[set]});
+      Run<Simulator> run(&moved, arm, r, windows[window].recording, {&sets[set]});
       calls.constants(w.model, w.data);
       calls.reset(w.model, w.data);
       run.window(windows[window], rows[window], {set}, &out);

@@ -40,7 +40,8 @@ class ServoDrive {
   using Index = Eigen::Index;
 
  public:
-  ServoDrive(const ServoArm& arm, const ServoRecording& recording, const ServoSet& set, Eigen::Index joint)
+  /// number: of the recording.
+  ServoDrive(const ServoArm& arm, const ServoRecording& recording, const ServoSet& set, int number, Eigen::Index joint)
       : command_(recording.command, joint),
         position_(recording.position, joint),
         gain_(recording.gain, joint),
@@ -63,6 +64,7 @@ class ServoDrive {
     const auto steps = static_cast<std::size_t>(std::lround(recording.step / arm.step));
     for (std::size_t k = 0; k < steps; ++k) late_.push_back(late(static_cast<double>(k) * step_ - d(F::delay)));
     play_ = Play(0.5 * d(F::backlash));
+    if (set.charge.size() > 0) integral_ = set.charge(number, joint);
   }
 
   /// Inertia of the rotor that the joint carries at most.
@@ -160,15 +162,20 @@ class ServoDrive {
                       static_cast<int>(f->values.size())});
   }
 
-  void begin(Eigen::Index row, double angle, double speed) {
-    rotor_ = angle;
+  /// Begins at a row, with an encoder at this angle and speed. Where a rotor has a play or a spring before it, what
+  /// weight asks of the link [Nm | N], of this inertia, says where it stands. The link's angle.
+  double begin(Eigen::Index row, double angle, double speed, double load = 0.0, double inertia = 1.0) {
+    const double half = 0.5 * d(F::backlash);
+    side_ = has_rotor_ && std::abs(load) * kFalls * kFalls > 2.0 * half * inertia ? std::copysign(1.0, load) : 0.0;
+    const double twist = has_rotor_ ? side_ * half + d(F::elasticity) * load : 0.0;
+    rotor_ = on_motor_ ? angle : angle + twist;
     rotor_speed_ = speed;
-    play_.begin();
-    side_ = 0.0;
+    play_.begin(side_);
     pending_ = false;
     wanted_ = held(row);
     enter(row);
     remember(row);
+    return on_motor_ ? angle - twist : angle;
   }
 
   /// From this row on until the next: what the recording says beside the command.
@@ -210,6 +217,7 @@ class ServoDrive {
   /// The step that begins now of a joint that has a rotor of its own and is looked at apart. inertia: of the link
   /// [kg m^2 | kg]; against: what it asks for [Nm | N].
   void turn(const ServoMoment& now, double inertia, double against, double* angle, double* speed) {
+    side_ = 0.0;  // `play_` has it
     const Held command = commanded(now);
     const bool bends = d(F::presliding) > 0.0;
     PairedBody rotor = driven(now, command, bends);
@@ -231,8 +239,9 @@ class ServoDrive {
  private:
   static constexpr double kTurning = 0.01;        ///< [rad/s | m/s] where friction that is computed here turns round
   static constexpr double kSpringDamping = 0.07;  ///< of the critical, with the link held: of a spring
-  static constexpr double kLinkArmature = 0.02;   ///< of the rotor's inertia that stays at the link, behind a play
-  static constexpr double kSlope = 1e-5;          ///< of an effort, or [Nm]: step of the derivative of the drive's law
+  static constexpr double kFalls = 0.3;  ///< [s] in which a link falls through half of a play, if it lies on a stop
+  static constexpr double kLinkArmature = 0.02;  ///< of the rotor's inertia that stays at the link, behind a play
+  static constexpr double kSlope = 1e-5;         ///< of an effort, or [Nm]: step of the derivative of the drive's law
   static constexpr double kStraight = 1e-3;  ///< of the reference: below it a root is a line, or its slope has no end
 
   /// A joint's column of a recording's table; a table of one column, or row, holds for all.

@@ -92,9 +92,9 @@ class ServoLanes {
     const bool steady = r.gain.rows() == 1 && r.supply.rows() == 1 && r.enabled.rows() == 1 && r.warmth.rows() == 1;
     for (Index j = first; j < end; ++j) {
       const auto column = [&](const Eigen::MatrixXd& table) { return table.col(j).data() + window.first; };
-      lanes_.push_back({ServoDrive(task_.arm, r, set, j), piece, left_.size(), &window, column(path.inertia),
-                        column(path.bias), column(path.cosine), column(path.sine), column(r.position), j,
-                        r.position.rows() - 1 - window.first, steady});
+      lanes_.push_back({ServoDrive(task_.arm, r, set, window.recording, j), piece, left_.size(), &window,
+                        column(path.inertia), column(path.bias), column(path.cosine), column(path.sine),
+                        column(r.position), j, r.position.rows() - 1 - window.first, steady});
     }
     left_.push_back(false);
     longest_ = std::max(longest_, window.rows);

@@ -30,7 +30,8 @@ inline double speed_alone(const PairedBody& b, double h) {
 class Play {
  public:
   explicit Play(double half = 0.0) : half_(half) {}
-  void begin() { side_ = 0.0; }
+  /// side: 1: the rotor is at the stop ahead of the link, -1: at that behind it, 0: somewhere between.
+  void begin(double side = 0.0) { side_ = side; }
 
   void step(double h, PairedBody* rotor, PairedBody* link) {
     if (side_ != 0.0 && together(h, rotor, link)) return;

@@ -187,15 +187,17 @@ void bind_servo(py::module_& m) {
              return ServoWindow{recording, first, rows};
            }),
            py::arg("recording"), py::arg("first"), py::arg("rows"));
-  py::class_<ServoSet>(m, "ServoSet", "Values of the chain of every joint, shape=(joints, fields).")
+  py::class_<ServoSet>(m, "ServoSet", R"(Values of the chain of every joint, shape=(joints, fields).
+
+charge: integrals of the command error at the first rows of recordings, shape=(recordings, joints); empty: zero.)")
       .def(py::init([](Eigen::MatrixXd chain, double weight_scale, int bodies, const std::vector<Function>& functions,
-                       int only) {
-             ServoSet out{std::move(chain), weight_scale, bodies, only, {}};
+                       int only, Eigen::MatrixXd charge) {
+             ServoSet out{std::move(chain), weight_scale, bodies, only, {}, std::move(charge)};
              for (const Function& one : functions) out.functions.push_back(function_of(one));
              return out;
            }),
            py::arg("chain"), py::arg("weight_scale") = 1.0, py::arg("bodies") = -1,
-           py::arg("functions") = std::vector<Function>{}, py::arg("only") = -1);
+           py::arg("functions") = std::vector<Function>{}, py::arg("only") = -1, py::arg("charge") = Eigen::MatrixXd());
   py::class_<ServoPath>(m, "ServoPath", "What each joint feels along a recorded motion of the others.")
       .def(py::init([](Eigen::MatrixXd inertia, Eigen::MatrixXd bias, Eigen::MatrixXd cosine, Eigen::MatrixXd sine,
                        Eigen::VectorXd turns) {

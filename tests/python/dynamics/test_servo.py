@@ -32,6 +32,7 @@ from truing.dynamics.servo.ground import (
     _from_file as from_file,
     first_guess,
     groundwork,
+    near_file,
     shared_scale,
     sizes_of,
     with_limits,
@@ -386,6 +387,69 @@ def test_the_whole_arm_has_a_rotor_as_short_steps_have_it(
     short = in_short_steps(of, points)
     whole = what_it_does(of.simulator.run(points, of.windows)[0])
     assert np.std(whole - short) < 0.2 * np.std(short)
+
+
+@pytest.mark.parametrize("encoder", [0.0, 1.0])
+@pytest.mark.parametrize("field, value", [("elasticity", 0.1), ("backlash", 0.1)])
+def test_a_rotor_that_holds_a_weight_stands_where_it_does_when_a_window_begins(
+    tmp_path: Path, field: str, value: float, encoder: float
+) -> None:
+    """Held out level the weight twists the spring by 59 mrad, or lies on a stop of the play: nothing moves,
+    of the whole arm as of a joint apart."""
+    path = tmp_path / "level.xml"
+    path.write_text(PENDULUM.replace('pos="0 0 -0.15"', 'pos="0.15 0 0"'), encoding="utf-8")
+    rows = np.zeros((200, 1))
+    one = recording("held", rows - 0.4 * 9.81 * 0.15 / 4.0, rows)  # by a gain of 4 Nm/rad
+    of = prepare(path, [one], window=np.inf)
+    point = point_of(of.arm.nominal)
+    for name, size in ((field, value), ("motor_encoder", encoder)):
+        point = point.with_value(0, name, size)
+    for simulator in (of.simulator, Apart(of.simulator, LONGEST_STEP)):
+        moved = simulator.run([point], of.windows)[0][0]
+        assert np.abs(moved).max() < 1e-3
+
+
+def test_an_integral_holds_the_weight_that_it_held_before_a_recording_began(tmp_path: Path) -> None:
+    """A recording of eight seconds less its first three is moved as the whole of it was: what the integral
+    held then is found, where nothing would leave the arm to fall by what it carries."""
+    path = tmp_path / "level.xml"
+    path.write_text(PENDULUM.replace('pos="0 0 -0.15"', 'pos="0.15 0 0"'), encoding="utf-8")
+    command = 0.5 * commands(2, 8.0)
+    whole = prepare(path, [recording("r", command, np.zeros_like(command))], window=np.inf)
+    point = point_of(whole.arm.nominal).with_value(0, "integral_gain", 6.0)
+    start = np.zeros((1, 1))
+    moved = whole.simulator._with([point], whole.windows, [start], False, None)[0][0]
+    late = recording("late", command[301:], moved[300 : len(command) - 1])
+    of = prepare(path, [late], window=np.inf)
+    held = np.sum(command[:301] - np.vstack([start, moved[:300]])) * STEP
+    for simulator in (of.simulator, Apart(of.simulator, LONGEST_STEP)):
+        found = simulator._charges.of([point], of.windows)[0]
+        assert found.shape == (1, 1) and abs(found[0, 0] - held) < 0.05 * abs(held)
+        errors = Fitter(simulator, rows_of(of.data, of.windows)).errors(
+            simulator.run([point], of.windows)[0][0]
+        )
+        assert np.sqrt(np.mean(errors**2)) < 3e-3  # 39e-3 without
+    assert not of.simulator._charges.of([point_of(of.arm.nominal)], of.windows)[0].size
+
+
+def test_a_second_place_to_look_from_has_the_files_torques_where_these_were_left(file: Path) -> None:
+    """All torques of a fit ten times the file's: beside it stands one with the file's gain, the others fitted
+    to it; of a fit at the file's torques there is none."""
+    of = prepared_of(file, recordings_of(file))
+    fitter, nominal = Fitter(of.simulator, rows_of(of.data, of.train)), point_of(of.arm.nominal)
+    sizes = sizes_of(of.simulator, nominal, of.train)
+    free = usual_values(of.arm.nominal, sizes, False)
+    start = np.array([f.at(nominal) for f in free])
+    fitted = fitter.fit(nominal, free, start, None, 1)
+    assert near_file(fitter, fitted, nominal) is None
+    torques = [FIELDS.index(name) for name in ("command_gain", "viscous", "coulomb", "armature")]
+    chain = nominal.chain.copy()
+    chain[:, torques] *= 10.0
+    far = replace(fitted, point=replace(nominal, chain=chain))
+    near = near_file(fitter, far, nominal)
+    assert near is not None and near[1] == [0]
+    assert near[0].point.value(0, "command_gain") == nominal.value(0, "command_gain")
+    assert np.mean(near[0].errors ** 2) < 0.1 * np.mean(fitter.errors(fitter.motions([far.point])[0]) ** 2)
 
 
 def test_a_value_that_nothing_depends_on_does_not_overflow(file: Path) -> None:

@@ -121,6 +121,7 @@ struct ServoSet {
   int bodies = -1;  ///< number of its ServoBodies; -1: the model's
   int only = -1;    ///< of joints apart: the one that is moved, the others' numbers are zero; -1: all
   std::vector<ServoFunction> functions;
+  Eigen::MatrixXd charge;  ///< shape=(recordings, joints) [rad s | m s]: integrals at their first rows; empty: zero
 };
 
 /// Simulated positions, and the drives' torques.

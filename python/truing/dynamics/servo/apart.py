@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
+from truing.dynamics.servo.charge import Charges
 from truing.dynamics.servo.data import ServoData, Stream, Window
 from truing.dynamics.servo.simulator import FIELDS, Point, Simulator
 from truing.dynamics.smoothing import cubics, rows_within
@@ -25,7 +26,7 @@ Tables = tuple[Floats, Floats, Floats, Floats]
 Lane = tuple[object, ...]
 """All that the motion of a joint apart goes by: its number, values, masses, functions, windows."""
 
-_SAG = FIELDS.index("supply_sag")
+_SAG, _SUMS = FIELDS.index("supply_sag"), FIELDS.index("integral_gain")
 _FAR = 1e3  # [rad | m]: what is so far has left
 _REMEMBERED = 4_000_000  # numbers, 32 MB
 _SMOOTHING = 0.03  # [s] on both sides, of accelerations: they are needed of the other joints alone
@@ -53,6 +54,7 @@ class Apart:
         self._numbers: dict[tuple[Window, ...], int] = {}
         none = np.zeros((0, len(names)))
         self._turned = self._turns.astype(float)
+        self._charges = Charges(self.data, self._charged)
         self._unseen = _core.ServoPath(none, none, none, none, self._turned)
 
     def in_gravity(self, gravity: Floats) -> Apart:
@@ -145,14 +147,32 @@ class Apart:
     ) -> tuple[list[Floats], list[Floats]]:
         if not points:
             return [], []
+        charges = self._charges.of(points, windows)
+        return self._with(points, windows, charges, torques, moved)
+
+    def _charged(
+        self, points: Sequence[Point], windows: Sequence[Window], charges: Sequence[Floats]
+    ) -> list[Floats]:
+        moved = [-1 if np.any(p.chain[:, _SAG] != 0.0) else _alone(p.chain[:, _SUMS] > 0.0) for p in points]
+        return self._with(points, windows, charges, False, moved)[0]
+
+    def _with(
+        self,
+        points: Sequence[Point],
+        windows: Sequence[Window],
+        charges: Sequence[Floats],
+        torques: bool,
+        moved: Sequence[int],
+    ) -> tuple[list[Floats], list[Floats]]:
+        """charges: of each point, what its integrals hold when recordings begin."""
         kinds: dict[tuple[object, ...], int] = {}
         for p in points:
             kinds.setdefault(_masses(p), len(kinds))
         streams = tuple(sorted({w.stream for w in windows}))
         paths = [self._path(p, streams) for p in {_masses(p): p for p in points}.values()]
         sets = [
-            _core.ServoSet(p.chain, p.weight, kinds[_masses(p)], list(p.functions), joint)
-            for p, joint in zip(points, moved, strict=True)
+            _core.ServoSet(p.chain, p.weight, kinds[_masses(p)], list(p.functions), joint, charge)
+            for p, joint, charge in zip(points, moved, charges, strict=True)
         ]
         some = [_core.ServoWindow(w.stream, w.first, w.rows) for w in windows]
         whole = self.whole
@@ -252,6 +272,11 @@ def in_a_row(numbers: NDArray[np.intp]) -> slice | NDArray[np.intp]:
     first = int(numbers[0])
     follows = np.array_equal(numbers, np.arange(first, first + numbers.size))
     return slice(first, first + numbers.size) if follows else numbers
+
+
+def _alone(which: NDArray[np.bool_]) -> int:
+    """The number of the only one; -1: there are others."""
+    return int(np.argmax(which)) if np.sum(which) == 1 else -1
 
 
 def has_left(motion: Floats) -> bool:

@@ -34,6 +34,7 @@ _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
 _RUBS = 0.1  # of a joint's usual torque: dry friction
 TORQUES = ("command_gain", "viscous", "coulomb", "armature")
+_FAR_SCALE = np.log(3.0)  # of all torques at once: a joint that has left its file
 _STATED = {
     "command_gain": 0.0,
     "viscous": LEAST_FRICTION,
@@ -234,6 +235,25 @@ def shared_scale(point: Point, nominal: Point) -> Floats:
         if logs.size and abs(np.sum(np.sign(logs))) == logs.size:
             out[j] = np.median(logs)
     return out
+
+
+def near_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> tuple[Fitted, list[int]] | None:
+    """A second place to look from, and the joints at which it is one: where all torques of a joint have left
+    the file's by far, they are the file's there, its gain held, the others fitted. What was missing may have
+    led them away: an integral holds weight that a position error would, as torques do that are so large that
+    weight is nothing; among these its derivatives show nothing of it. None: no joint's torques have."""
+    far = np.flatnonzero(np.abs(shared_scale(fitted.point, nominal)) > _FAR_SCALE)
+    if not far.size:
+        return None
+    columns = np.array([FIELDS.index(name) for name in (*TORQUES, "saturation")])
+    chain = fitted.point.chain.copy()
+    chain[np.ix_(far, columns)] = nominal.chain[np.ix_(far, columns)]
+    mine = [k for k, f in enumerate(fitted.free) if f.joint in far and f.field != "command_gain"]
+    free = [fitted.free[k] for k in mine]
+    start = np.array([f.at(replace(fitted.point, chain=chain)) for f in free])
+    near = fitter.fit(replace(fitted.point, chain=chain), free, start, None, _ROUNDS // 4, shown=False)
+    errors, table = fitter.columns(near.point, fitted.free)
+    return replace(fitted, point=near.point, errors=errors, columns=table), [int(j) for j in far]
 
 
 def _from_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:

@@ -25,6 +25,7 @@ from truing.dynamics.servo.fit import (
     sums_by_fold,
 )
 from truing.dynamics.servo.free import USUAL, Free, Sizes, moved
+from truing.dynamics.servo.ground import near_file, sizes_of
 from truing.dynamics.servo.simulator import FIELDS, Point
 
 Floats = NDArray[np.float64]
@@ -45,6 +46,7 @@ _FIRST_ROUNDS, _MORE_ROUNDS = 1, 5  # of a refit: from each start, from the best
 _STRAIGHT = 5.0  # standard errors from a fit: so far its derivatives are taken to hold
 _OF_ARM = 5, 2  # the same of what is of the whole arm, where every joint is refitted; of one effect
 _LEAST_PART = 0.05  # of what the usual parameters leave at a joint, that a name removes
+_NEAR = 3  # candidates of a joint that are fitted from a second place
 _STARTS = 2  # that a refit is begun from: those of least error
 _HOPELESS = 0.3  # of the best refit's nats: what a refit has won after its first rounds, or it ends
 _WIDE = (0.5, 2.0)  # of a prior: sizes that a candidate is looked at
@@ -444,6 +446,8 @@ class Namer:
         sums = self.sums(fitted, columns)
         ranks = self.ranked(sums, *_groups(sums, fitted, candidates))[1]
         starts = self.starts(fitted, candidates, sums.noise)
+        for k, second in self._starts_near(account, candidates, sums.noise).items():
+            starts[k] = max(starts[k], second, key=lambda one: one[0])
         order = sorted(ranks, key=lambda r: -max(r.score, starts[r.candidate][0]))
         best: list[tuple[float, Candidate, Fitted]] = []
         seen: dict[tuple[str, tuple[str, ...]], int] = {}  # places, and their joints
@@ -507,6 +511,36 @@ class Namer:
                     for follow, (_, step) in zip(here, found, strict=True):
                         base = follow.moved(base, point, step)
                     out[k] = (gain, base)
+        return out
+
+    def _starts_near(
+        self, account: Account, candidates: Sequence[Candidate], noise: Noise
+    ) -> dict[int, tuple[float, Point]]:
+        """The same from a second place (`near_file`), of candidates of its joints: the best few of each are
+        fitted, as its torques have far to go. Nats over the fit."""
+        fitted, fitter = account.fitted, self.fitter
+        place = near_file(fitter, fitted, account.nominal)
+        if place is None:
+            return {}
+        near, joints = place
+        sizes = sizes_of(fitter.simulator, near.point, fitter.rows.windows)
+        forms = {(c.label, c.joint): c for c in self.all_candidates(near.point, sizes)[0]}
+        out: dict[int, tuple[float, Point]] = {}
+        for joint in joints:
+            mine = [k for k, c in enumerate(candidates) if c.joint == joint]
+            tried = [(k, number) for k in mine for number in range(len(_sizes(candidates[k])))]
+            chain = fitted.point.chain.copy()
+            chain[joint] = near.point.chain[joint]
+            base = replace(fitted.point, chain=chain)
+            points = [_wide(forms[candidates[k].label, joint], base, number, 1.0) for k, number in tried]
+            follow = _Follow(near, joint, noise)
+            best: dict[int, tuple[float, Point]] = {}
+            for (k, _), point, motion in zip(tried, points, fitter.motions(points), strict=True):
+                gain, step = follow.gain(fitter.errors(motion), point)
+                if k not in best or gain > best[k][0]:
+                    best[k] = gain, follow.moved(fitted.point, point, step)
+            for k in sorted(best, key=lambda k: -best[k][0])[:_NEAR]:
+                out[k] = self._refit(fitted, candidates[k], [best[k][1]], noise, 0.0)[0], best[k][1]
         return out
 
     def _fitted(self, fitted: Fitted, one: Candidate) -> bool:

@@ -22,6 +22,7 @@ from truing import _core
 from truing.dynamics.export import import_mujoco
 from truing.dynamics.servo.arm import ServoArm
 from truing.dynamics.servo.chain import ServoChain, ServoJoint
+from truing.dynamics.servo.charge import Charges
 from truing.dynamics.servo.data import ServoData, Window
 from truing.errors import InputError
 from truing.files.mjcf_file import quiet
@@ -108,6 +109,7 @@ class Simulator:
         self._known: dict[tuple[bytes, Window], Floats] = {}
         self._numbers = 0  # of these
         self.simulated = 0  # chains, times the windows of each
+        self._charges = Charges(data, self._charged)
         joints = [self.model.joint(name) for name in arm.nominal.joints]
         self._places = [int(joint.qposadr[0]) for joint in joints], [int(joint.dofadr[0]) for joint in joints]
         self.core_arm = self.core_arm_with(data.step)
@@ -162,11 +164,27 @@ class Simulator:
         torques: bool,
         heard: Callable[[int, int], None] | None,
     ) -> tuple[list[Floats], list[Floats]]:
+        return self._with(points, windows, self._charges.of(points, windows), torques, heard)
+
+    def _charged(
+        self, points: Sequence[Point], windows: Sequence[Window], charges: Sequence[Floats]
+    ) -> list[Floats]:
+        return self._with(points, windows, charges, False, None)[0]
+
+    def _with(
+        self,
+        points: Sequence[Point],
+        windows: Sequence[Window],
+        charges: Sequence[Floats],
+        torques: bool,
+        heard: Callable[[int, int], None] | None,
+    ) -> tuple[list[Floats], list[Floats]]:
+        """charges: of each point, what its integrals hold when recordings begin."""
         self.simulated += len(points) * len(windows)
         bodies, places = self._bodies(points)
         sets = [
-            _core.ServoSet(p.chain, p.weight, place, list(p.functions))
-            for p, place in zip(points, places, strict=True)
+            _core.ServoSet(p.chain, p.weight, place, list(p.functions), charge=charge)
+            for p, place, charge in zip(points, places, charges, strict=True)
         ]
         parts: list[tuple[list[Floats], list[Floats]]] = []
         with quiet(self.mujoco), _untimed(self._library):
