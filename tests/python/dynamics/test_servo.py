@@ -32,7 +32,7 @@ from truing.dynamics.servo.ground import (
     _from_file as from_file,
     first_guess,
     groundwork,
-    near_file,
+    other_places,
     shared_scale,
     sizes_of,
     with_limits,
@@ -432,7 +432,7 @@ def test_an_integral_holds_the_weight_that_it_held_before_a_recording_began(tmp_
     assert not of.simulator._charges.of([point_of(of.arm.nominal)], of.windows)[0].size
 
 
-def test_a_second_place_to_look_from_has_the_files_torques_where_these_were_left(file: Path) -> None:
+def test_another_place_to_look_from_has_the_files_torques_where_these_were_left(file: Path) -> None:
     """All torques of a fit ten times the file's: beside it stands one with the file's gain, the others fitted
     to it; of a fit at the file's torques there is none."""
     of = prepared_of(file, recordings_of(file))
@@ -441,15 +441,16 @@ def test_a_second_place_to_look_from_has_the_files_torques_where_these_were_left
     free = usual_values(of.arm.nominal, sizes, False)
     start = np.array([f.at(nominal) for f in free])
     fitted = fitter.fit(nominal, free, start, None, 1)
-    assert near_file(fitter, fitted, nominal) is None
+    assert other_places(fitter, fitted, nominal, sizes) == []
     torques = [FIELDS.index(name) for name in ("command_gain", "viscous", "coulomb", "armature")]
     chain = nominal.chain.copy()
     chain[:, torques] *= 10.0
     far = replace(fitted, point=replace(nominal, chain=chain))
-    near = near_file(fitter, far, nominal)
-    assert near is not None and near[1] == [0]
-    assert near[0].point.value(0, "command_gain") == nominal.value(0, "command_gain")
-    assert np.mean(near[0].errors ** 2) < 0.1 * np.mean(fitter.errors(fitter.motions([far.point])[0]) ** 2)
+    (place,) = other_places(fitter, far, nominal, sizes)
+    assert place.joints == [0] and place.held == "command_gain"
+    near = place.near
+    assert near.point.value(0, "command_gain") == nominal.value(0, "command_gain")
+    assert np.mean(near.errors**2) < 0.1 * np.mean(fitter.errors(fitter.motions([far.point])[0]) ** 2)
 
 
 def test_a_value_that_nothing_depends_on_does_not_overflow(file: Path) -> None:
@@ -818,6 +819,46 @@ def test_what_held_out_motion_vetoes_leaves_the_chain(file: Path) -> None:
     assert found.rollout.errors["named"][0, -1] == pytest.approx(
         found.rollout.errors["standard"][0, -1], rel=0.05
     )
+
+
+def with_value(namer: Namer, account: Account, label: str) -> Candidate:
+    """The form of this label, fitted beside all else."""
+    fitted = account.fitted
+    one = next(c for c in namer.all_candidates(fitted.point, account.sizes)[0] if c.label == label)
+    start = np.array([*fitted.start, *(f.at(fitted.point) for f in one.free)])
+    free, noise = [*fitted.free, *one.free], namer.noise_after(fitted)
+    account.fitted = namer.fitter.settled(fitted.point, free, start, noise, 5, "")
+    return one
+
+
+def test_what_was_idle_beside_a_name_that_does_not_hold_is_tried_again(file: Path) -> None:
+    recordings = recordings_of(file, 5e-4, delay=0.04)
+    namer, standard = groundwork_of(file, recordings)
+    nominal = point_of(namer.arm.nominal)
+    sizes = sizes_of(namer.fitter.simulator, nominal, namer.fitter.rows.windows)
+    found = {}
+    for idle in (False, True):
+        account = Account(standard, standard, [], sizes, nominal)
+        late = next(c for c in namer.all_candidates(standard.point, sizes)[0] if c.label == "delay")
+        account.idle = [late] if idle else []
+        account.found = [with_value(namer, account, "spring")]
+        namer.drop(account, 0)
+        found[idle] = [one.effect for one in account.found]
+    assert found == {False: [], True: ["delay"]}
+
+
+def test_another_place_to_look_from_has_no_delay_where_a_joint_was_late(file: Path) -> None:
+    namer, standard = groundwork_of(file, recordings_of(file, delay=0.04))
+    nominal = point_of(namer.arm.nominal)
+    sizes = sizes_of(namer.fitter.simulator, nominal, namer.fitter.rows.windows)
+    assert not any(p.held == "delay" for p in other_places(namer.fitter, standard, nominal, sizes))
+    account = Account(standard, standard, [], sizes, nominal)
+    with_value(namer, account, "delay")
+    assert account.fitted.point.value(0, "delay") == pytest.approx(0.04, abs=2e-3)
+    places = other_places(namer.fitter, account.fitted, nominal, sizes)
+    (place,) = (p for p in places if p.held == "delay")
+    assert place.joints == [0] and place.near.point.value(0, "delay") == 0.0
+    assert np.mean(place.near.errors**2) < 2.0 * np.mean(standard.errors**2)
 
 
 # ---- values that few rows do not decide ---------------------------------------------------------------

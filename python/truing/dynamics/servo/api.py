@@ -228,7 +228,7 @@ def _what_holds(
     if idle is None:
         return account, sure, functions
     at, function = idle
-    less = replace(account, found=list(account.found), vetoed=list(account.vetoed))
+    less = replace(account, found=list(account.found), vetoed=list(account.vetoed), idle=list(account.idle))
     less.vetoed.append((account.found[at], f"what nobody knows goes with the {function.input} in its place"))
     namer.drop(less, at)
     found = _what_holds(namer, less, judge, single)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ _SCANNED = 12  # windows that the first scan looks at, at most
 _RUBS = 0.1  # of a joint's usual torque: dry friction
 TORQUES = ("command_gain", "viscous", "coulomb", "armature")
 _FAR_SCALE = np.log(3.0)  # of all torques at once: a joint that has left its file
+_FAR_DELAY = 0.5  # of the bus's delay: a joint that has left it
+_LIMITED = np.array([FIELDS.index(name) for name in (*TORQUES, "saturation")])
 _STATED = {
     "command_gain": 0.0,
     "viscous": LEAST_FRICTION,
@@ -237,23 +239,59 @@ def shared_scale(point: Point, nominal: Point) -> Floats:
     return out
 
 
-def near_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> tuple[Fitted, list[int]] | None:
-    """A second place to look from, and the joints at which it is one: where all torques of a joint have left
-    the file's by far, they are the file's there, its gain held, the others fitted. What was missing may have
-    led them away: an integral holds weight that a position error would, as torques do that are so large that
-    weight is nothing; among these its derivatives show nothing of it. None: no joint's torques have."""
+@dataclass(frozen=True)
+class Place:
+    """Another fit to look from, the joints at which it is one, and the field that it holds there."""
+
+    near: Fitted
+    joints: list[int]
+    held: str
+
+
+def other_places(fitter: Fitter, fitted: Fitted, nominal: Point, sizes: Sizes) -> list[Place]:
+    """Where a fit may have been led away by what was missing, fits that hold what it let go."""
+    places = [_near_file(fitter, fitted, nominal), _near_bus(fitter, fitted, sizes)]
+    return [place for place in places if place is not None]
+
+
+def _near_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> Place | None:
+    """Where all torques of a joint have left the file's by far, these, its gain held. An integral holds
+    weight that a position error would, as torques do that are so large that weight is nothing; among these
+    its derivatives show nothing of it."""
     far = np.flatnonzero(np.abs(shared_scale(fitted.point, nominal)) > _FAR_SCALE)
-    if not far.size:
-        return None
-    columns = np.array([FIELDS.index(name) for name in (*TORQUES, "saturation")])
     chain = fitted.point.chain.copy()
-    chain[np.ix_(far, columns)] = nominal.chain[np.ix_(far, columns)]
-    mine = [k for k, f in enumerate(fitted.free) if f.joint in far and f.field != "command_gain"]
+    chain[np.ix_(far, _LIMITED)] = nominal.chain[np.ix_(far, _LIMITED)]
+    return _holding(fitter, fitted, chain, far, "command_gain")
+
+
+def _near_bus(fitter: Fitter, fitted: Fitted, sizes: Sizes) -> Place | None:
+    """Where a joint is later than the bus, or less, by far, the bus's delay (none, where it is late alone),
+    with a rotor and dry friction. A spring between rotor and link looks late, and the link's inertia then
+    like less."""
+    late = [f for f in fitted.free if f.field == "delay" and f.joint >= 0]
+    values = np.array([f.at(fitted.point) for f in late])
+    bus = float(np.median(values)) if len(late) >= _KIND else 0.0
+    far = np.array([f.joint for f in late], dtype=np.intp)[np.abs(values - bus) > _FAR_DELAY * bus]
+    chain = fitted.point.chain.copy()
+    chain[far, FIELDS.index("delay")] = bus
+    for name, least in (("armature", sizes.inertia), ("coulomb", _RUBS * sizes.torque)):
+        chain[far, FIELDS.index(name)] = np.maximum(chain[far, FIELDS.index(name)], least[far])
+    return _holding(fitter, fitted, chain, far, "delay")
+
+
+def _holding(
+    fitter: Fitter, fitted: Fitted, chain: Floats, joints: NDArray[np.intp], held: str
+) -> Place | None:
+    """The fit from this chain, a field held at these joints. None: at none."""
+    if not joints.size:
+        return None
+    mine = [k for k, f in enumerate(fitted.free) if f.joint in joints and f.field != held]
     free = [fitted.free[k] for k in mine]
-    start = np.array([f.at(replace(fitted.point, chain=chain)) for f in free])
-    near = fitter.fit(replace(fitted.point, chain=chain), free, start, None, _ROUNDS // 4, shown=False)
+    near = fitter.fit(
+        replace(fitted.point, chain=chain), free, fitted.start[mine], None, _ROUNDS // 2, shown=False
+    )
     errors, table = fitter.columns(near.point, fitted.free)
-    return replace(fitted, point=near.point, errors=errors, columns=table), [int(j) for j in far]
+    return Place(replace(fitted, point=near.point, errors=errors, columns=table), [*map(int, joints)], held)
 
 
 def _from_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> Fitted:

@@ -25,7 +25,7 @@ from truing.dynamics.servo.fit import (
     sums_by_fold,
 )
 from truing.dynamics.servo.free import USUAL, Free, Sizes, moved
-from truing.dynamics.servo.ground import near_file, sizes_of
+from truing.dynamics.servo.ground import Place, other_places, sizes_of
 from truing.dynamics.servo.simulator import FIELDS, Point
 
 Floats = NDArray[np.float64]
@@ -46,7 +46,7 @@ _FIRST_ROUNDS, _MORE_ROUNDS = 1, 5  # of a refit: from each start, from the best
 _STRAIGHT = 5.0  # standard errors from a fit: so far its derivatives are taken to hold
 _OF_ARM = 5, 2  # the same of what is of the whole arm, where every joint is refitted; of one effect
 _LEAST_PART = 0.05  # of what the usual parameters leave at a joint, that a name removes
-_NEAR = 3  # candidates of a joint that are fitted from a second place
+_NEAR = 3  # candidates of a joint that are fitted from another place
 _STARTS = 2  # that a refit is begun from: those of least error
 _HOPELESS = 0.3  # of the best refit's nats: what a refit has won after its first rounds, or it ends
 _WIDE = (0.5, 2.0)  # of a prior: sizes that a candidate is looked at
@@ -105,6 +105,7 @@ class Account:
     """By the place of what was taken: rivals that were refitted where it was."""
     weights: list[Weight] = field(default_factory=list)
     vetoed: list[tuple[Candidate, str]] = field(default_factory=list)  # and why they are not named
+    idle: list[Candidate] = field(default_factory=list)  # what was dropped beside what is named
     late: Fitted | None = (
         None  # with the usual parameters and the delay that joints have alike, if it is found
     )
@@ -341,7 +342,16 @@ class Namer:
         less = self.without(account, at, noise)
         account.remove(at)
         account.fitted = self.polished(less, noise)
+        self._again(account)
         self._weigh(account)
+
+    def _again(self, account: Account) -> None:
+        """What was idle beside a name that did not hold may not be idle without it."""
+        vetoed = {other.place for other, _ in account.vetoed}
+        again = {(c.label, c.joint) for c in account.idle if c.place not in vetoed}
+        account.idle.clear()
+        while again and self._round(account, set(), again):
+            pass
 
     def _question(self, account: Account, joint: int) -> None:
         """Looks again at every earlier name of the joint where one was taken: another may stand there now."""
@@ -381,6 +391,7 @@ class Namer:
             less, weight, needed = self.weighed(account, at, noise, squares)
             if not needed:
                 self.fitter.progress(f"{one.effect} {' '.join(one.joints)} is idle")
+                account.idle.append(one)
                 account.remove(at)
                 account.fitted = self.polished(less, noise)
                 return True
@@ -402,8 +413,14 @@ class Namer:
         needed = loss >= THRESHOLD and self.predicts(before, squares, LEAST_GAIN, loss)
         return less, Weight(before, squares, loss, less.point), needed
 
-    def _round(self, account: Account, refused: set[tuple[str, int]]) -> bool:
-        best, noise = self.best_beside(account, refused)
+    def _round(
+        self,
+        account: Account,
+        refused: set[tuple[str, int]],
+        only: set[tuple[str, int]] | None = None,
+    ) -> bool:
+        """Takes what wins most. only: labels and joints of these forms."""
+        best, noise = self.best_beside(account, refused, only=only)
         if not best:
             return False
         taken: dict[int, int] = {}  # the best of each joint; what moves all joints alone
@@ -421,9 +438,14 @@ class Namer:
         return True
 
     def best_beside(
-        self, account: Account, refused: set[tuple[str, int]], joint: int | None = None
+        self,
+        account: Account,
+        refused: set[tuple[str, int]],
+        joint: int | None = None,
+        only: set[tuple[str, int]] | None = None,
     ) -> tuple[list[tuple[float, Candidate, Fitted]], Noise]:
-        """What may stand beside what was found, refitted, the best first. joint: only there."""
+        """What may stand beside what was found, refitted, the best first. joint, only: only there, of these
+        labels and joints."""
         fitted = account.fitted
         candidates, account.not_testable, base = self.all_candidates(fitted.point, account.sizes)
         there = {c.place for c in account.found}
@@ -431,6 +453,10 @@ class Namer:
         if joint is not None:
             here = (joint, -1) if self.joints == 1 else (joint,)
             candidates = [c for c in candidates if c.joint in here]
+        if only is not None:
+            candidates = [c for c in candidates if (c.label, c.joint) in only]
+        if not candidates:
+            return [], self.noise_after(fitted)
         with self.fitter.beside(fitted):
             return self._best_of(account, refused, candidates, base)
 
@@ -446,7 +472,7 @@ class Namer:
         sums = self.sums(fitted, columns)
         ranks = self.ranked(sums, *_groups(sums, fitted, candidates))[1]
         starts = self.starts(fitted, candidates, sums.noise)
-        for k, second in self._starts_near(account, candidates, sums.noise).items():
+        for k, second in self._starts_elsewhere(account, candidates, sums.noise).items():
             starts[k] = max(starts[k], second, key=lambda one: one[0])
         order = sorted(ranks, key=lambda r: -max(r.score, starts[r.candidate][0]))
         best: list[tuple[float, Candidate, Fitted]] = []
@@ -513,34 +539,51 @@ class Namer:
                     out[k] = (gain, base)
         return out
 
-    def _starts_near(
+    def _starts_elsewhere(
         self, account: Account, candidates: Sequence[Candidate], noise: Noise
     ) -> dict[int, tuple[float, Point]]:
-        """The same from a second place (`near_file`), of candidates of its joints: the best few of each are
-        fitted, as its torques have far to go. Nats over the fit."""
-        fitted, fitter = account.fitted, self.fitter
-        place = near_file(fitter, fitted, account.nominal)
-        if place is None:
-            return {}
-        near, joints = place
-        sizes = sizes_of(fitter.simulator, near.point, fitter.rows.windows)
-        forms = {(c.label, c.joint): c for c in self.all_candidates(near.point, sizes)[0]}
+        """The same from other places, of candidates that belong there: the best few of each are fitted, as
+        they have far to go. Nats over the fit."""
         out: dict[int, tuple[float, Point]] = {}
-        for joint in joints:
-            mine = [k for k, c in enumerate(candidates) if c.joint == joint]
-            tried = [(k, number) for k in mine for number in range(len(_sizes(candidates[k])))]
-            chain = fitted.point.chain.copy()
-            chain[joint] = near.point.chain[joint]
-            base = replace(fitted.point, chain=chain)
-            points = [_wide(forms[candidates[k].label, joint], base, number, 1.0) for k, number in tried]
-            follow = _Follow(near, joint, noise)
-            best: dict[int, tuple[float, Point]] = {}
-            for (k, _), point, motion in zip(tried, points, fitter.motions(points), strict=True):
-                gain, step = follow.gain(fitter.errors(motion), point)
-                if k not in best or gain > best[k][0]:
-                    best[k] = gain, follow.moved(fitted.point, point, step)
-            for k in sorted(best, key=lambda k: -best[k][0])[:_NEAR]:
-                out[k] = self._refit(fitted, candidates[k], [best[k][1]], noise, 0.0)[0], best[k][1]
+        fitter = self.fitter
+        for place in other_places(fitter, account.fitted, account.nominal, account.sizes):
+            sizes = sizes_of(fitter.simulator, place.near.point, fitter.rows.windows)
+            forms = {(c.label, c.joint): c for c in self.all_candidates(place.near.point, sizes)[0]}
+            for joint in place.joints:
+                some = {k: forms[c.label, joint] for k, c in enumerate(candidates) if c.joint == joint}
+                for k, start in self._starts_near(account.fitted, place, joint, some, noise).items():
+                    out[k] = max(out.get(k, start), start, key=lambda one: one[0])
+        return out
+
+    def _starts_near(
+        self, fitted: Fitted, place: Place, joint: int, forms: Mapping[int, Candidate], noise: Noise
+    ) -> dict[int, tuple[float, Point]]:
+        """forms: of some candidates, as large as they are usual at this place."""
+        fitter, near = self.fitter, place.near
+        tried = [(k, number) for k, one in forms.items() for number in range(len(_sizes(one)))]
+        chain = fitted.point.chain.copy()
+        chain[joint] = near.point.chain[joint]
+        base = replace(fitted.point, chain=chain)
+        points = [_wide(forms[k], base, number, 1.0) for k, number in tried]
+        follow = _Follow(near, joint, noise)
+        best: dict[int, tuple[float, list[Point]]] = {}
+        for (k, _), point, motion in zip(tried, points, fitter.motions(points), strict=True):
+            gain, step = follow.gain(fitter.errors(motion), point)
+            if k not in best or gain > best[k][0]:
+                best[k] = gain, [follow.moved(fitted.point, point, step), point]
+        mine = [k for k, f in enumerate(fitted.free) if f.joint == joint and f.field != place.held]
+        free, start = [fitted.free[k] for k in mine], fitted.start[mine]
+        every = (fitted.free, fitted.start, noise)
+        before = fitter.joint_costs(fitted.errors, fitted.point, *every)[joint]
+        out: dict[int, tuple[float, Point]] = {}
+        for k in sorted(best, key=lambda k: -best[k][0])[:_NEAR]:
+            one = forms[k]
+            for point in best[k][1]:
+                means = np.array([*start, *(_begin(f, one, point) for f in one.free)])
+                fit = fitter.fit(point, [*free, *one.free], means, noise, 2 * _MORE_ROUNDS, shown=False)
+                after = fitter.joint_costs(fit.errors, fit.point, *every)[joint]
+                if k not in out or before - after > out[k][0]:
+                    out[k] = float(before - after), fit.point
         return out
 
     def _fitted(self, fitted: Fitted, one: Candidate) -> bool:
