@@ -455,9 +455,10 @@ def test_the_chain_itself_is_judged_beside_what_is_written(
     ours = (chain, servo_arm(source).mjcf)
     judged = judge_servo(models, chain.joints, [(recording, held_rows)], ours).judgement
     assert judged is not None and list(judged.simulated) == ["named", "exported"]
-    # Two programs, one chain: they part where a bristle is modelled (the elbow), by less than half a degree.
+    # Two programs, one chain: they part where a bristle is modelled (the elbow), and where the chain's
+    # integral begins with what it held before the recording, here wrong weight's, and MuJoCo's at zero.
     apart = np.sqrt(np.mean((judged.simulated["named"] - judged.simulated["exported"]) ** 2, axis=(0, 1)))
-    assert apart[0] < math.radians(0.1) and apart[1] < math.radians(0.6)
+    assert apart[0] < math.radians(0.1) and apart[1] < math.radians(1.0)
     # With the masses of the file the chain is somewhere else.
     light = judge_servo(models, chain.joints, [(recording, held_rows)], (truth_chain(), ours[1])).judgement
     assert light is not None
