@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import truing
 from pages import visible
 from truing.cli import main
-from truing.dynamics.uncertainty import MASSES, Randomisation, randomisation
+from truing.dynamics.uncertainty import MASSES, Known, Randomisation, Uncertain, randomisation
 from truing.dynamics.uncertainty.written import isaaclab_text, yaml_text
 from truing.errors import InputError
 
@@ -278,6 +278,21 @@ def test_isaac_lab_events_draw_together_and_write_what_an_actuator_has(
     assert not arm.actuators["arm"].stiffness[:, 0].any()
     assert set(np.unique(arm.lag)) <= set(range(13)) and 4 <= np.median(arm.lag) <= 8  # 30 ms of 5 ms
     assert "masses" in file.read_text()
+
+
+def test_what_of_damping_is_the_controllers_goes_to_the_actuator() -> None:
+    some = (
+        Uncertain("viscous.J1", "Nm s/rad", "log", 2.0, 0.1, 0.1),
+        Uncertain("viscous.J2", "Nm s/rad", "log", 3.0, 0.1, 0.1),
+    )
+    settled = (Known("damping_gain.J1", "Nm s/rad", 0.5, 0.0, "found well"),)
+    left = Randomisation("arm", some, np.eye(2), settled, (), by_controller={"J1": 0.8})
+    read: dict[str, Any] = {"__name__": "events"}
+    exec(isaaclab_text(left), read)
+    parts = [(field, joint, pytest.approx(part)) for _, field, joint, part in read["FIELDS"]]
+    assert parts == [("viscous", "J1", 0.2), ("damping", "J1", 0.8), ("viscous", "J2", 1.0)]
+    assert read["BESIDE"] == {("damping", "J1"): 0.5}
+    assert read["FOUND"]["J1"] == {"viscous": pytest.approx(0.4), "damping": pytest.approx(2.1)}
 
 
 class Scene(dict[str, Any]):

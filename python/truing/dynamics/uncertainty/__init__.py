@@ -11,7 +11,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -84,6 +84,8 @@ class Randomisation:
     known: tuple[Known, ...]
     classes: tuple[str, ...]  # what the recordings cannot tell apart, in words
     notes: tuple[str, ...] = ()
+    by_controller: Mapping[str, float] = field(default_factory=dict)
+    """By joint, where it is any: the part of `viscous` that is the controller's damping."""
 
     @property
     def names(self) -> list[str]:
@@ -243,7 +245,14 @@ def _of_commands(result: Mapping[str, Any], known: float, mass_uncertainty: floa
         settled,
         tuple(str(one["sentence"]) for one in result.get("classes", [])),
         tuple(notes),
+        _by_controller(result),
     )
+
+
+def _by_controller(result: Mapping[str, Any]) -> dict[str, float]:
+    joints = (result.get("chains") or {}).get("named", {}).get("joints", {})
+    parts = {joint: float(drive.get("limited_damping") or 0.0) for joint, drive in joints.items()}
+    return {joint: part for joint, part in parts.items() if part > 0.0}
 
 
 def _part(sigma: float, of: float) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -102,7 +102,9 @@ COVARIANCE = {covariance!r}
 """In the scales: of the logarithm where LOG."""
 BOUNDS = {bounds!r}
 FIELDS = {fields!r}
-"""(column, field, joint) of what an actuator has."""
+"""(column, field, joint, part of it) of what an actuator has."""
+BESIDE = {beside!r}
+"""By field and joint: what is there of it beside what is drawn."""
 COEFFICIENTS = (("friction", "joint_friction_coeff"), ("viscous", "joint_viscous_friction_coeff"))
 FOUND = {found!r}
 """Of these fields, by joint: as it was found."""
@@ -131,8 +133,11 @@ def randomise_servos(env, env_ids, seed=None):
     random = np.random.default_rng(seed)
     table = torch.as_tensor(draw(len(ids), random), dtype=torch.float32, device=asset.device)
     step = env.physics_dt
-    drawn = {{(field, joint): table[:, column] for column, field, joint in FIELDS}}
-    for joint in sorted({{joint for _, _, joint in FIELDS}}):
+    drawn = {{}}
+    for column, field, joint, part in FIELDS:
+        before = drawn.get((field, joint), BESIDE.get((field, joint), 0.0))
+        drawn[field, joint] = before + part * table[:, column]
+    for joint in sorted({{joint for _, joint in drawn}}):
         number = asset.find_joints(joint)[0]
         friction = {{
             name: drawn[field, joint].unsqueeze(1)
@@ -186,15 +191,19 @@ else:
 
 def isaaclab_text(left: Randomisation) -> str:
     """Source of events.py."""
-    columns = [(k, *_of_actuator(one.name)) for k, one in enumerate(left.uncertain)]
-    fields = [(k, field, joint) for k, field, joint in columns if field]
-    others = [one.name for one in left.uncertain if not _of_actuator(one.name)[0]]
+    fields = [
+        (k, *one) for k, name in enumerate(left.names) for one in _of_actuator(name, left.by_controller)
+    ]
+    others = [name for name in left.names if not _of_actuator(name, left.by_controller)]
     found: dict[str, dict[str, float]] = {}
+    beside: dict[tuple[str, str], float] = {}
     settled = [(one.name, one.value) for one in left.known]
     for name, value in [*((one.name, one.value) for one in left.uncertain), *settled]:
-        field, joint = _of_actuator(name)
-        if field:
-            found.setdefault(joint, {})[field] = value
+        for field, joint, part in _of_actuator(name, left.by_controller):
+            of_joint = found.setdefault(joint, {})
+            of_joint[field] = of_joint.get(field, 0.0) + part * value
+            if (name, value) in settled:
+                beside[field, joint] = beside.get((field, joint), 0.0) + part * value
     return _EVENTS.format(
         robot=_plain(left.robot) or "the robot",
         mapped=", ".join(f"{ours} is {theirs}" for ours, theirs in FIELDS.items()),
@@ -206,6 +215,7 @@ def isaaclab_text(left: Randomisation) -> str:
         bounds=[[_finite(end) for end in one.bounds] for one in left.uncertain],
         fields=fields,
         found=found,
+        beside=beside,
     )
 
 
@@ -218,9 +228,14 @@ def _plain(text: str) -> str:
     return text.replace("\\", "").replace('"', "")
 
 
-def _of_actuator(name: str) -> tuple[str, str]:
-    field, _, joint = name.partition(".")
-    return FIELDS.get(field, ""), joint
+def _of_actuator(name: str, by_controller: Mapping[str, float]) -> list[tuple[str, str, float]]:
+    """Fields of a joint's actuator, and the parts of the value that they get."""
+    ours, _, joint = name.partition(".")
+    if ours not in FIELDS:
+        return []
+    part = by_controller.get(joint, 0.0) if ours == "viscous" else 0.0
+    out = [(FIELDS[ours], joint, 1.0 - part)] if part < 1.0 else []
+    return [*out, (FIELDS["damping_gain"], joint, part)] if part > 0.0 else out
 
 
 def table_rows(left: Randomisation) -> Sequence[tuple[str, str, str, str]]:
