@@ -32,6 +32,7 @@ Run = Callable[[Sequence[Any], Sequence[Window], Sequence[Floats]], list[Floats]
 
 _SEEN = 2.0  # [s] of a recording, that say how it began
 _ALIKE = 0.2  # [s] of rows that count as one
+_KEPT = 4000  # charges
 _GAIN, _SUMS = (_core.servo_fields().index(name) for name in ("command_gain", "integral_gain"))
 
 
@@ -61,6 +62,8 @@ class Charges:
         for k in summing:
             out[k] = np.zeros((len(self._data.streams), self._data.joints))
             out[k][streams] = [self._known[keys[k], stream] for stream in streams]
+        while len(self._known) > _KEPT:
+            self._known.pop(next(iter(self._known)))
         return out
 
     def _find(self, points: Mapping[bytes, Summing], streams: Sequence[int]) -> None:
@@ -82,8 +85,6 @@ class Charges:
                 left = np.sum(errors**2, axis=0) - xy**2 / np.maximum(xx, 1e-300)
                 noise = left / w.rows * min(w.rows, _ALIKE / stream.step)
                 self._known[key, w.stream] = unit[k] * xy / np.maximum(xx + noise, 1e-300)
-        while len(self._known) > 4000:
-            self._known.pop(next(iter(self._known)))
 
     def _first(self, stream: int) -> Window:
         of = self._data.streams[stream]

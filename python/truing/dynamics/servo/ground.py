@@ -26,9 +26,8 @@ _KIND = 3  # joints of one gain in the file, at least: servos of one kind
 _ALIKE = 0.2  # of the logarithm of their gains
 _SAME_SQUARES = 0.3  # more of a joint's squared error, before it is fitted again: its scale is not seen
 _SCALES = (1.0, 0.2, 0.5, 2.0)  # of all torques, from which a fit goes on
-_FINER_GAIN = (
-    0.1  # of a joint's squared error, that finer differences, or another place of damping, have to win
-)
+_FINER_GAIN = 0.1  # of a joint's squared error, that finer differences have to win
+_WITHIN_GAIN = 0.1  # the same of damping that ends at the largest torque
 _NEAR = 10.0  # times a joint's squared error: with the file's torques they may still be the better ones
 _LEAST_ERROR = 1e-6  # [rad | m]
 _SCANNED = 12  # windows that the first scan looks at, at most
@@ -36,7 +35,7 @@ _RUBS = 0.1  # of a joint's usual torque: dry friction
 TORQUES = ("command_gain", "viscous", "coulomb", "armature")
 _FAR_SCALE = np.log(3.0)  # of all torques at once: a joint that has left its file
 _FAR_DELAY = 0.5  # of the bus's delay: a joint that has left it
-_LIMITED = np.array([FIELDS.index(name) for name in (*TORQUES, "saturation")])
+_AND_LIMIT = np.array([FIELDS.index(name) for name in (*TORQUES, "saturation")])
 _STATED = {
     "command_gain": 0.0,
     "viscous": LEAST_FRICTION,
@@ -91,7 +90,7 @@ def first_guess(simulator: Simulator | Apart, rows: Rows, point: Point, torque_c
     """Joint by joint the best of wide steps in gain, damping, friction and rotor, and in all torques at once,
     of which only weight and masses say how large they are: a file may be off by hundreds, where no derivative
     leads back. All joints are changed at once: they hardly see each other."""
-    fitter = Fitter(simulator, _few(Fitter(simulator, rows)))
+    fitter = Fitter(simulator, _few(simulator, rows))
     names = [name for name in TORQUES if not (torque_command and name == "command_gain")]
     wide = [([name], _GAINS if name == "command_gain" else _WIDE) for name in names]
     fine = [([name], _FINE) for name in names]
@@ -139,9 +138,10 @@ def _better_start(
     chain[:, FIELDS.index("armature")] = sizes.inertia
     chain[:, FIELDS.index("coulomb")] = _RUBS * sizes.torque
     begins = [point, replace(point, chain=chain)]
-    limited = bool(_limited(fitter, nominal).any())
+    limited = _reaches_limit(fitter, nominal)
     if not fitter.simulator.data.torque_command:
-        few, carried = Fitter(fitter.simulator, _few(fitter)), _carried(fitter.simulator)
+        few = Fitter(fitter.simulator, _few(fitter.simulator, fitter.rows))
+        carried = _carried(fitter.simulator)
         for one in [point, nominal] if limited else [point]:
             begins.append(narrowed(few, scattered(one, carried)))
     if limited:
@@ -155,7 +155,7 @@ def _best_ends(fitter: Fitter, begins: Sequence[Point], free: Sequence[Free], st
     fits = [fitter.fit(one, free, start, None, _ROUNDS, "groundwork", shown=False) for one in begins]
     within = [fit.point.chain[:, FIELDS.index("limited_damping")] > 0.0 for fit in fits]
     squares = np.array([np.mean(fit.errors**2, axis=0) for fit in fits])
-    best = np.argmin(np.where(within, squares / (1.0 - _FINER_GAIN), squares), axis=0)
+    best = np.argmin(np.where(within, squares / (1.0 - _WITHIN_GAIN), squares), axis=0)
     return replace(begins[0], chain=np.array([fits[k].point.chain[j] for j, k in enumerate(best)]))
 
 
@@ -167,20 +167,19 @@ def _turned(point: Point, nominal: Point) -> Point:
     return replace(point, chain=chain)
 
 
-def _few(fitter: Fitter) -> Rows:
+def _few(simulator: Simulator | Apart, rows: Rows) -> Rows:
     """A dozen windows' rows: enough for a first look."""
-    windows = fitter.rows.windows
-    return rows_of(fitter.simulator.data, windows[:: max(1, len(windows) // _SCANNED)])
+    return rows_of(simulator.data, rows.windows[:: max(1, len(rows.windows) // _SCANNED)])
 
 
-def _limited(fitter: Fitter, point: Point) -> NDArray[np.bool_]:
-    """Joints whose controller makes damping and that are at their largest torque in some row."""
+def _reaches_limit(fitter: Fitter, point: Point) -> bool:
+    """Whether a joint whose controller makes damping is at its largest torque in some row."""
     within = point.chain[:, FIELDS.index("limited_damping")] > 0.0
     if not within.any():
-        return within
+        return False
     torque = fitter.simulator.run([point], fitter.rows.windows, torques=True)[1][0]
     at_most = np.abs(torque) >= (1.0 - _TINY) * point.chain[:, FIELDS.index("saturation")]
-    return np.asarray(at_most.any(axis=0) & within)
+    return bool(np.any(at_most.any(axis=0) & within))
 
 
 def _beyond_limit(point: Point) -> Point:
@@ -260,7 +259,7 @@ def _near_file(fitter: Fitter, fitted: Fitted, nominal: Point) -> Place | None:
     its derivatives show nothing of it."""
     far = np.flatnonzero(np.abs(shared_scale(fitted.point, nominal)) > _FAR_SCALE)
     chain = fitted.point.chain.copy()
-    chain[np.ix_(far, _LIMITED)] = nominal.chain[np.ix_(far, _LIMITED)]
+    chain[np.ix_(far, _AND_LIMIT)] = nominal.chain[np.ix_(far, _AND_LIMIT)]
     return _holding(fitter, fitted, chain, far, "command_gain")
 
 

@@ -25,10 +25,7 @@ _DRAWN = 512
 _AT_ONCE = 64
 _FREQUENCY = (3.0, 300.0)  # [rad/s] undamped
 _DAMPING = (0.1, 30.0)  # of the critical
-_ROTOR = (
-    0.01,
-    30.0,
-)  # over what the joint carries, or the file's rotor, the lesser for less, the larger for more
+_ROTOR = (0.01, 30.0)  # over the lesser, and the larger, of what the joint carries and the file's rotor
 _VALUES = ("command_gain", "viscous", "coulomb", "armature")
 _KEPT, _AROUND = 8, 256
 _WIDTHS = (1.0, 0.5, 0.25, 0.12)  # of logarithms
