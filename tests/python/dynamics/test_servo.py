@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, servo_diagnose, servo_dict
+from truing.dynamics.servo import PARAMETERS, ServoDiagnosis, charge, servo_diagnose, servo_dict
 from truing.dynamics.servo.apart import Apart, longer_step
 from truing.dynamics.servo.api import LONGEST_STEP, Judge, Prepared, _veto as vetoed, prepare, removes
 from truing.dynamics.servo.candidates import Candidate, candidates_of
@@ -543,6 +543,16 @@ def test_dry_friction_is_held_as_newtons_method_holds_it(tmp_path: Path) -> None
         rubs = point.with_value(slice(None), "coulomb", coulomb)
         motions = [of.simulator.run([rubs], of.windows)[0][0] for of in (fast, slow)]
         assert np.abs(motions[0] - motions[1]).max() < 1e-6
+
+
+def test_more_charges_than_are_kept_serve_a_batch(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    of = prepared_of(file, recordings_of(file))
+    sums = [point_of(of.arm.nominal).with_value(0, "integral_gain", k) for k in (1.0, 2.0, 3.0)]
+    kept = of.simulator.run(sums, of.windows, torques=True)[0]
+    monkeypatch.setattr(charge, "_KEPT", 1)
+    again = prepared_of(file, recordings_of(file))
+    for one, other in zip(kept, again.simulator.run(sums, again.windows, torques=True)[0], strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_torques_that_share_a_factor_are_one_departure(file: Path) -> None:
