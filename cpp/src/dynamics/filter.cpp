@@ -22,8 +22,16 @@ void copy_mirrored(const double* x, Eigen::Index rows, Eigen::Index begin, Eigen
   const Eigen::Index last = rows - 1;
   Eigen::Index k = begin;
   for (; k < std::min<Eigen::Index>(0, begin + count); ++k) *out++ = 2.0 * x[0] - x[std::min(-k, last)];
-  for (; k < std::min(rows, begin + count); ++k) *out++ = x[k];
+  const Eigen::Index recorded = std::max(k, std::min(rows, begin + count));
+  out = std::copy(x + k, x + recorded, out);
+  k = recorded;
   for (; k < begin + count; ++k) *out++ = 2.0 * x[last] - x[std::max<Eigen::Index>(0, 2 * last - k)];
+}
+
+/// So many rows, or as few more as the kernels take.
+constexpr Eigen::Index padded(Eigen::Index rows) {
+  constexpr Eigen::Index k = kernel::kSampleMultiple;
+  return (rows + k - 1) / k * k;
 }
 
 }  // namespace
@@ -49,20 +57,26 @@ void filter_column(const double* x, Eigen::Index rows, const Eigen::VectorXd& we
   const auto taps = static_cast<int>(weights.size()), step = static_cast<int>(stride);
   for (Eigen::Index done = 0; done < count; done += kTogether) {
     const Eigen::Index some = std::min(kTogether, count - done);
-    const auto all =
-        static_cast<int>((some + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple) * kernel::kSampleMultiple;
-    const Eigen::Index needed = (some - 1) * stride + taps, room = (all - 1) * stride + taps;
-    reached.resize(static_cast<std::size_t>(room));
-    scratch.resize(kernel::filter_scratch(step, taps, all));
+    const Eigen::Index needed = (some - 1) * stride + taps;
+    reached.resize(static_cast<std::size_t>((padded(some) - 1) * stride + taps));
     copy_mirrored(x, rows, (first + done) * stride - taps / 2, needed, reached.data());
-    // Many columns act now and then only: beside a knot, while a play is crossed.
-    if (std::all_of(reached.begin(), reached.begin() + needed, [](double value) { return value == 0.0; })) {
-      std::fill_n(out + done, some, 0.0);
-      continue;
-    }
     std::fill(reached.begin() + needed, reached.end(), 0.0);
-    kernel::functions().filter(reached.data(), step, weights.data(), taps, all, scratch.data(), sums.data());
-    std::copy_n(sums.data(), some, out + done);
+    // Many columns act now and then only: beside a knot, while a play is crossed. No other output sees anything.
+    const auto is_not_zero = [](double value) { return value != 0.0; };
+    const Eigen::Index least = std::find_if(reached.begin(), reached.end(), is_not_zero) - reached.begin();
+    const Eigen::Index most = reached.rend() - std::find_if(reached.rbegin(), reached.rend(), is_not_zero);
+    const Eigen::Index begin = std::min(some, std::max<Eigen::Index>(0, (least - taps + stride) / stride));
+    const Eigen::Index end = std::max(begin, std::min(some, (most + stride - 1) / stride));
+    double* const to = out + done;
+    std::fill_n(to, begin, 0.0);
+    std::fill(to + end, to + some, 0.0);
+    if (begin == end) continue;
+    // Kernels take so many outputs at once: more of them before the first one where there are none behind the last.
+    const Eigen::Index all = padded(end - begin), from = std::min(begin, padded(some) - all);
+    scratch.resize(kernel::filter_scratch(step, taps, static_cast<int>(all)));
+    kernel::functions().filter(reached.data() + from * stride, step, weights.data(), taps, static_cast<int>(all),
+                               scratch.data(), sums.data());
+    std::copy(sums.data() + (begin - from), sums.data() + (end - from), to + begin);
   }
 }
 

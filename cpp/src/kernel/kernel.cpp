@@ -382,8 +382,9 @@ void add_squared(const double* c, std::ptrdiff_t stride, const double* row, int 
   }
 }
 
-// Filter: rows side by side, so that a row's sum goes through the weights in their order whatever its lane.
-constexpr int kFilterPacks = 8 / kLanes > 4 ? 8 / kLanes : 4;
+// Filter: rows side by side, so that a row's sum goes through the weights in their order whatever its lane. So many
+// sums at a time hide that each waits for itself.
+constexpr int kFilterPacks = 8;
 
 template <int packs>
 inline void filter_rows(const double* phases, std::ptrdiff_t length, int step, const double* weights, int weight_count,
@@ -406,8 +407,11 @@ void filter(const double* x, int step, const double* weights, int weight_count, 
   const std::ptrdiff_t length = count + weight_count / step + 1,
                        last = (count - 1) * std::ptrdiff_t{step} + weight_count;
   for (std::ptrdiff_t phase = 0; phase < step; ++phase) {
-    double* to = scratch + phase * length;
-    for (std::ptrdiff_t i = 0; i < length; ++i) to[i] = i * step + phase < last ? x[i * step + phase] : 0.0;
+    double* const to = scratch + phase * length;
+    const double* from = x + phase;
+    const std::ptrdiff_t there = (last - phase + step - 1) / step;  // at most `length`
+    for (std::ptrdiff_t i = 0; i < there; ++i, from += step) to[i] = *from;
+    for (std::ptrdiff_t i = there; i < length; ++i) to[i] = 0.0;
   }
   int first = 0;
   for (; first + kFilterPacks * kLanes <= count; first += kFilterPacks * kLanes)

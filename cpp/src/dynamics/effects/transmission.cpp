@@ -155,11 +155,18 @@ TorqueForm backlash_over(const Robot& robot, std::size_t joint, double crossed, 
   TorqueTerm term = of_all_joints(robot, parameter_name("backlash", robot, joint), angle_unit(robot, joint), prior);
   term.needs_torque = term.needs_inertia = true;
   term.basis = [=](const Motion& m) -> MatrixXd {
-    MatrixXd inertia = m.inertia[joint];
+    const MatrixXd& inertia = m.inertia[joint];
     const VectorXd load = m.carried.col(at) - before * inertia.col(at).cwiseProduct(m.qdd.col(at));
-    inertia.col(at) *= 1.0 - before;
-    const VectorXd place = flight_in_play(load, inertia.col(at).cwiseMax(kLeastInertia), crossed, m.step);
-    return inertia.array().colwise() * (rate_of(rate_of(place, m.step), m.step).col(0).array() / crossed);
+    const VectorXd of_link = (1.0 - before) * inertia.col(at);
+    const VectorXd place = flight_in_play(load, of_link.cwiseMax(kLeastInertia), crossed, m.step);
+    const VectorXd pull = rate_of(rate_of(place, m.step), m.step).col(0) / crossed;
+    MatrixXd out = MatrixXd::Zero(m.rows(), inertia.cols());
+    for (Index i = 0; i < pull.size(); ++i) {
+      if (pull[i] == 0.0) continue;  // it is carried, in all but few rows
+      out.row(i) = pull[i] * inertia.row(i);
+      out(i, at) = pull[i] * of_link[i];
+    }
+    return out;
   };
   term.constants[parameter_name("backlash", robot, joint, kCrossed)] = crossed;
   if (before > 0.0) term.constants[parameter_name("backlash", robot, joint, kBefore)] = before;
