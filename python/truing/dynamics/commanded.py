@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.export import import_mujoco
 from truing.dynamics.motion import Track, even_track
+from truing.dynamics.recorded import OFF
 from truing.dynamics.runner import Runnable, Runner, mjcf_as_it_is
 from truing.errors import InputError
 from truing.files import is_mjcf
@@ -25,8 +26,6 @@ from truing.files.mjcf_file import quiet
 
 Floats = NDArray[np.float64]
 CommandKind = Literal["position", "torque"]
-
-OFF = 0.5  # of the column `enabled`: below it the drives gave no torque
 
 
 @dataclass(frozen=True)

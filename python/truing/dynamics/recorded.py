@@ -15,6 +15,8 @@ from truing import _core
 
 Floats = NDArray[np.float64]
 
+OFF = 0.5  # of the column `enabled`: below it the drives gave no torque
+
 
 class Recorded(Protocol):
     """What of a recording is used; tables without columns were not recorded."""

@@ -22,6 +22,7 @@ from truing.dynamics.sanity import (
     between,
     columns,
     commands,
+    drives_off,
     gravity,
     jumps,
     lag,
@@ -48,6 +49,7 @@ OF_ANGLES = ("angle_convention", "joint_sign", "joint_order")  # findings that n
 HIDES_LENGTHS = ("load_comes_and_goes", "load_differs")  # findings with which masses are no constants
 ANGLES: list[Check] = [jumps.unfolded, jumps.without_frozen]
 JUMPS: list[Check] = [*ANGLES, jumps.without_spikes]
+DRIVES: list[Check] = [drives_off.without_drives_off]
 
 
 def check_recordings(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:
@@ -144,7 +146,7 @@ def _by_themselves(
     """What clocks, angles and speeds show without a model: findings, recordings and their grids."""
     found, recordings = columns.clock(recordings)
     magnitudes = are_magnitudes(robot, recordings)  # they turn back at zero, which is no spike
-    more, recordings = _mended(robot, recordings, ANGLES if magnitudes else JUMPS)
+    more, recordings = _mended(robot, recordings, [*(ANGLES if magnitudes else JUMPS), *DRIVES])
     grids = grids_of(robot, recordings)
     of_speeds, by_speed, by_angle = speeds(robot, grids)
     recordings = [_scaled(one, by_speed.get(one.name), by_angle.get(one.name)) for one in recordings]
