@@ -77,7 +77,11 @@ MatrixXd Tile::own_rows(const MatrixXd& values) const {
 }
 
 void Tile::own_rows(const double* column, double* out) const {
-  filter_column(column, motion.rows(), weights, stride, first, count, out);
+  if (between == 1) return filter_column(column, motion.rows(), weights, stride, first, count, out);
+  const Index rows = (motion.rows() - 1) / between + 1;
+  const VectorXd recorded =
+      Eigen::Map<const VectorXd, 0, Eigen::InnerStride<>>(column, rows, Eigen::InnerStride<>(between));
+  filter_column(recorded.data(), rows, weights, stride / between, first, count, out);
 }
 
 VectorXd Tile::own_time() const {
@@ -93,6 +97,13 @@ MatrixXd measured_torque(const Recording& recording, const std::vector<double>& 
   for (Index j = 0; j < joints && recording.current.cols() == joints; ++j) {
     if (std::isnan(out(0, j))) out.col(j) = recording.current.col(j) * torque_per_ampere[static_cast<std::size_t>(j)];
   }
+  return out;
+}
+
+double cutoff_of(const std::vector<Recording>& recordings, double wanted) {
+  double out = 0.0;
+  for (const Recording& recording : recordings)
+    out = std::max(out, Stretch::cutoff_of(wanted, usual_step(recording.time)));
   return out;
 }
 
@@ -129,7 +140,7 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
   if (more) finish();
   if (!any) {
     throw std::invalid_argument("recording '" + recording.name + "': no stretch without gaps is longer than " +
-                                math::number(4.0 / options.cutoff, 3) +
+                                math::number(4.0 / Stretch::cutoff_of(options.cutoff, step), 3) +
                                 " s, which the low-pass needs: record longer, or give a higher cut-off");
   }
 }

@@ -40,6 +40,8 @@ struct Tile {
   Motion motion;
   Eigen::VectorXd weights;  ///< of the filter
   Eigen::Index stride = 1;
+  /// Torques were recorded at every so many rows of `motion`: the filter sees these alone.
+  Eigen::Index between = 1;
   Eigen::Index first = 0;    ///< of the filtered rows those before it only lead in
   Eigen::Index count = 0;    ///< of filtered rows that are this tile's own
   Eigen::MatrixXd measured;  ///< shape=(count, joints) [Nm | N] filtered; NaN: not measured
@@ -64,6 +66,9 @@ struct PrepareOptions {
   bool short_stretches = false;           ///< those between gaps that are shorter than the filter, too
   bool one_pass = false;                  ///< nobody asks for the tiles twice: they are not written to disk
 };
+
+/// [Hz] the wanted cut-off, or what the recordings show whose rows are the nearest.
+double cutoff_of(const std::vector<Recording>& recordings, double wanted);
 
 /// Calls `use` with each tile of a recording, in order of time, as long as it returns true. Of a recording that is read
 /// no more is in memory than a tile and what leads in to it. Throws std::invalid_argument: too short to be filtered.

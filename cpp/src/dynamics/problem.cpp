@@ -135,7 +135,7 @@ PrepareOptions prepare_options(const Robot& robot, const std::vector<Recording>&
                                std::vector<std::string>* warnings) {
   PrepareOptions out;
   out.torque_per_ampere = drive_constants(robot, recordings, warnings);
-  out.cutoff = cutoff;
+  out.cutoff = cutoff_of(recordings, cutoff);
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "dynamics/filter.hpp"
+#include "dynamics/spline.hpp"
 
 namespace truing::dynamics {
 namespace {
@@ -17,6 +18,9 @@ using Eigen::VectorXd;
 
 constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
 constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
+constexpr double kFar = 0.024;            ///< [s] between rows: from here on differences say too little of a motion
+constexpr double kBetween = 100.0;        ///< rows a second of the curve through such rows, at most
+constexpr double kMostOfRate = 0.25;      ///< cut-off to recorded rows a second: rows show nothing above a half
 constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
 constexpr double kForgets = 0.06;         ///< [rad | m] travel after which no play operator knows what was before
 constexpr double kMostLeadIn = 60.0;      ///< [s] of a joint that rests for longer, it is forgotten
@@ -80,11 +84,20 @@ Stretch::Stretch(std::size_t joints, std::vector<std::string> columns, double st
   const auto every = [](double per_cutoff, double cutoff, double of) {
     return std::max<Index>(1, static_cast<Index>(1.0 / (per_cutoff * cutoff * of)));
   };
+  cutoff_ = cutoff_of(options.cutoff, step);
   fine_ = every(kFinePerCutoff, options.cutoff, step);
-  fine_step_ = step * static_cast<double>(fine_);
-  stride_ = every(kCoarsePerCutoff, options.cutoff, fine_step_);
-  weights_ = low_pass(options.cutoff, step);
-  fine_weights_ = low_pass(options.cutoff, fine_step_);
+  between_ = step < kFar ? 1 : static_cast<Index>(kBetween * step + 1e-6);
+  fine_step_ = step * static_cast<double>(fine_) / static_cast<double>(between_);
+  const double seen_step = step * static_cast<double>(fine_);
+  coarse_ = fine_ * every(kCoarsePerCutoff, cutoff_, seen_step);
+  stride_ = coarse_ / fine_ * between_;
+  weights_ = low_pass(cutoff_, step);
+  seen_weights_ = low_pass(cutoff_, seen_step);
+  reach_ = seen_weights_.size() / 2 * between_;
+}
+
+double Stretch::cutoff_of(double wanted, double step) {
+  return step < kFar ? wanted : std::min(wanted, kMostOfRate / step);
 }
 
 void Stretch::add(const Recording& rows, Index begin, Index end, double start) {
@@ -103,7 +116,7 @@ void Stretch::add(const Recording& rows, Index begin, Index end, double start) {
 }
 
 bool Stretch::is_too_short() const {
-  return raw_.end() < 2 || (!options_.short_stretches && times_.back() - first_time_ < 4.0 / options_.cutoff);
+  return raw_.end() < 2 || (!options_.short_stretches && times_.back() - first_time_ < 4.0 / cutoff_);
 }
 
 /// At even steps, by straight lines between the rows.
@@ -132,7 +145,7 @@ void Stretch::resample(bool ended) {
 }
 
 void Stretch::filter(bool ended) {
-  const Index half = weights_.size() / 2, coarse = fine_ * stride_;
+  const Index half = weights_.size() / 2;
   const Index reached = ended ? even_.end() : std::max<Index>(0, even_.end() - half);
   const auto filtered_to = [&](RowWindow* out, Index first_column, Index stride) {
     const Index first = out->end(), end = std::max(first, (reached + stride - 1) / stride);
@@ -144,10 +157,11 @@ void Stretch::filter(bool ended) {
     out->append(more);
   };
   filtered_to(&smooth_, 0, 1);
-  filtered_to(&measured_, joints_, coarse);
+  filtered_to(&measured_, joints_, coarse_);
 }
 
 void Stretch::add_motion(bool ended) {
+  if (between_ > 1) return add_motion_between(ended);
   constexpr Index kReach = 2;  // of the second derivative
   const Index first = motion_.end(), known = ended ? smooth_.end() : std::max<Index>(0, smooth_.end() - kReach);
   const Index end = std::max(first, (known + fine_ - 1) / fine_);
@@ -164,20 +178,47 @@ void Stretch::add_motion(bool ended) {
   motion_.append(more);
 }
 
+// Rows that are far apart say less of speed and acceleration than the smooth curve through them does.
+void Stretch::add_motion_between(bool ended) {
+  const Index known = ended ? smooth_.end() : std::max<Index>(0, smooth_.end() - SplineBetween::kReach);
+  const Index first = motion_.end() / between_;  // whole steps between two rows, but for the last row
+  const Index steps = std::max<Index>(0, known - 1 - first);
+  if (motion_.end() > first * between_ || (steps == 0 && !(ended && known > first))) return;
+  const Index end = steps * between_ + (ended ? 1 : 0);
+  const auto further = static_cast<Index>(columns_.size());
+  MatrixXd more(end, 3 * joints_ + further);
+  const MatrixXd& q = smooth_.all();
+  for (Index part = 0; part < between_; ++part) {
+    const SplineBetween spline(static_cast<double>(part) / static_cast<double>(between_), step_);
+    const Index count = (end - part + between_ - 1) / between_;
+    for (Index j = 0; j < joints_; ++j) {
+      const MatrixXd values = spline.at(q.col(j), first - smooth_.begin(), count);
+      for (Index d = 0; d < 3; ++d)
+        for (Index i = 0; i < count; ++i) more(i * between_ + part, d * joints_ + j) = values(i, d);
+    }
+  }
+  for (Index i = 0; i < end; ++i) {
+    const Index row = first + i / between_, after = std::min(row + 1, even_.end() - 1);
+    const double part = static_cast<double>(i % between_) / static_cast<double>(between_);
+    more.row(i).tail(further) =
+        (1.0 - part) * even_.rows(row, 1).row(0).tail(further) + part * even_.rows(after, 1).row(0).tail(further);
+  }
+  motion_.append(more);
+}
+
 void Stretch::forget() {
-  const Index half = weights_.size() / 2, coarse = fine_ * stride_;
-  const Index needed =
-      std::min({smooth_.end() - half, measured_.end() * coarse - half, motion_.end() * fine_}) / coarse * coarse;
+  const Index half = weights_.size() / 2, done = motion_.end() / between_ * fine_;  // rows that the motion has
+  const Index needed = std::min({smooth_.end() - half, measured_.end() * coarse_ - half, done}) / coarse_ * coarse_;
   even_.drop_before(needed);
-  smooth_.drop_before(motion_.end() * fine_ - 2);
-  const Index reach = fine_weights_.size() / 2 + rows_in(kMostLeadIn + kRestWindow, fine_step_) + 2 * stride_;
+  smooth_.drop_before(done - std::max<Index>(2, between_ > 1 ? SplineBetween::kReach : 0));
+  const Index reach = reach_ + rows_in(kMostLeadIn + kRestWindow, fine_step_) + 2 * stride_;
   motion_.drop_before(next_ * stride_ - reach);
   measured_.drop_before(next_);
 }
 
 bool Stretch::is_complete(Index to, bool ended) const {
   if (ended) return true;
-  const Index reach = std::max(fine_weights_.size() / 2, rows_in(kRestWindow, fine_step_));
+  const Index reach = std::max(reach_, rows_in(kRestWindow, fine_step_));
   return measured_.end() >= to && motion_.end() > (to - 1) * stride_ + reach;
 }
 
@@ -211,12 +252,12 @@ Index Stretch::row_that_forgets(Index row) const {
 
 /// Rows [from, to) that the fit sees, with the rows before and after that filter and play operators reach.
 Tile Stretch::tile(Index from, Index to) const {
-  const Index half = fine_weights_.size() / 2;
-  const Index coarse_begin = row_that_forgets(std::max<Index>(0, from * stride_ - half)) / stride_;
-  const Index begin = coarse_begin * stride_, end = std::min(motion_.end(), (to - 1) * stride_ + half + 1);
+  const Index coarse_begin = row_that_forgets(std::max<Index>(0, from * stride_ - reach_)) / stride_;
+  const Index begin = coarse_begin * stride_, end = std::min(motion_.end(), (to - 1) * stride_ + reach_ + 1);
   Tile out;
-  out.weights = fine_weights_;
+  out.weights = seen_weights_;
   out.stride = stride_;
+  out.between = between_;
   out.first = from - coarse_begin;
   out.count = to - from;
   const MatrixXd rows = motion_.rows(begin, end - begin);
@@ -239,7 +280,7 @@ Tile Stretch::tile(Index from, Index to) const {
   out.moving = moving_rows(qd, window, stride_).middleRows(from - seen, to - from);
   out.inside = MatrixXd::Ones(to - from, joints_);
   // A tile that is not the last one ends further from the end of what was read than this.
-  const Index edge = std::min(rows_in(kEdge / options_.cutoff, fine_step_), motion_.end());
+  const Index edge = std::min(rows_in(kEdge / cutoff_, fine_step_), motion_.end());
   for (const Index at : {Index{0}, motion_.end() - edge}) {
     const Index first = std::max(from, (at + stride_ - 1) / stride_);
     const Index near = std::min(to, (at + edge - 1) / stride_ + 1) - first;

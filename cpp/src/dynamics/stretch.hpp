@@ -47,11 +47,14 @@ class Stretch {
   bool take(bool ended, const Use& use);
   /// Too short to be filtered; known when it has ended.
   bool is_too_short() const;
+  /// [Hz] the wanted one, or what rows show that are far apart.
+  static double cutoff_of(double wanted, double step);
 
  private:
   void resample(bool ended);
   void filter(bool ended);
   void add_motion(bool ended);
+  void add_motion_between(bool ended);
   void forget();
   bool is_complete(Eigen::Index to, bool ended) const;
   Eigen::Index row_that_forgets(Eigen::Index row) const;
@@ -61,10 +64,13 @@ class Stretch {
   Eigen::Index joints_;
   std::vector<std::string> columns_;
   double step_, fine_step_;
-  Eigen::Index fine_, stride_;  ///< steps in a row of the motion, rows of it in one that the fit sees
-  Eigen::VectorXd weights_, fine_weights_;
-  double first_time_ = 0.0;  ///< [s] of the first row
-  double start_ = 0.0;       ///< [s] where its recording begins
+  double cutoff_;                           ///< [Hz]
+  Eigen::Index fine_, between_;             ///< steps in a row of the motion, or rows of it in a step
+  Eigen::Index coarse_, stride_;            ///< steps, and rows of the motion, in a row that the fit sees
+  Eigen::VectorXd weights_, seen_weights_;  ///< of every step, and of rows of the motion as they were recorded
+  Eigen::Index reach_;                      ///< rows of the motion on both sides that the filter sees
+  double first_time_ = 0.0;                 ///< [s] of the first row
+  double start_ = 0.0;                      ///< [s] where its recording begins
   bool any_ = false;
 
   Eigen::Index even_rows_ = -1;  ///< of the whole stretch, known when it has ended

@@ -70,6 +70,7 @@ bool TileFile::add(const Tile& tile) {
   place.rows = motion.rows();
   place.joints = motion.q.cols();
   place.stride = tile.stride;
+  place.between = tile.between;
   place.first = tile.first;
   place.count = tile.count;
   place.weights = tile.weights.size();
@@ -98,6 +99,7 @@ Tile TileFile::read(std::size_t number, const Robot& robot) const {
   out.recording = place.recording;
   out.number = number;
   out.stride = place.stride;
+  out.between = place.between;
   out.first = place.first;
   out.count = place.count;
   out.weights.resize(place.weights);

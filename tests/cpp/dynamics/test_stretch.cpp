@@ -196,6 +196,44 @@ TEST_CASE("a recording that comes a few rows at a time has the same tiles but fo
   }
 }
 
+TEST_CASE("between rows that are far apart lies a smooth curve, and the filter sees torques where they were recorded") {
+  constexpr double kRate = 2.0 * 3.14159265358979 * 0.8;                              // [rad/s] one turn in ten rows
+  const auto torque = [](double t) { return std::sin(1.7 * t) > 0.0 ? 2.0 : -1.0; };  // turns between rows
+  Recording slow;
+  slow.name = "slow";
+  slow.time = Eigen::VectorXd::LinSpaced(7001, 0.0, 875.0);
+  slow.position.resize(7001, 2);
+  slow.torque.resize(7001, 2);
+  for (Eigen::Index i = 0; i < 7001; ++i) {
+    const double t = slow.time[i];
+    slow.position.row(i) << std::sin(kRate * t), std::sin(0.5 * t);
+    slow.torque.row(i) << torque(t), 0.0;
+  }
+  const Robot robot = swung::level_arm();
+  const std::vector<dynamics::Tile> tiles = tiles_of(slow, robot);
+  REQUIRE(tiles.size() > 4);
+  for (const dynamics::Tile& tile : tiles) {
+    CHECK(tile.motion.step == doctest::Approx(0.125 / 12.0));
+    const Eigen::VectorXd time = tile.own_time();
+    const Eigen::VectorXd expected =
+        tile.own_rows(tile.motion.time.unaryExpr([&](double t) { return torque(std::round(t * 1e6) * 1e-6); }));
+    // The low-pass takes some of the amplitude, and no differences take more of the acceleration than of the angle.
+    for (Eigen::Index i = 0; i < tile.count; ++i) {
+      if (time[i] < 5.0 || time[i] > 870.0) continue;
+      const Eigen::Index row = (tile.first + i) * tile.stride;
+      REQUIRE(std::abs(tile.motion.qdd(row, 0) + kRate * kRate * tile.motion.q(row, 0)) < 1e-3 * kRate * kRate);
+      REQUIRE(std::abs(tile.measured(i, 0) - expected[i]) < 1e-9);
+    }
+  }
+  const std::vector<dynamics::Tile> read = tiles_of(read_in_pieces(slow, 1013), robot);
+  REQUIRE(read.size() == tiles.size());
+  for (std::size_t k = 0; k < read.size(); ++k) {
+    CHECK(read[k].motion.time == tiles[k].motion.time);
+    CHECK(read[k].motion.qdd == tiles[k].motion.qdd);
+    CHECK(read[k].measured == tiles[k].measured);
+  }
+}
+
 TEST_CASE("times that go backwards from one piece to the next are refused") {
   const Recording whole = recording(20.0);
   Recording wrong = read_in_pieces(whole, 1000);

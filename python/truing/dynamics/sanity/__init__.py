@@ -152,7 +152,8 @@ def _by_themselves(
     recordings = [_scaled(one, by_speed.get(one.name), by_angle.get(one.name)) for one in recordings]
     if _any_change(by_angle):
         grids = grids_of(robot, recordings)
-    return [*found, *more, *of_speeds], recordings, [grid for grid in grids if len(grid.rows)]
+    slow = columns.slow(recordings)
+    return [*found, *more, *of_speeds, *slow], recordings, [grid for grid in grids if len(grid.rows)]
 
 
 def check_commands(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> CheckedRecordings:

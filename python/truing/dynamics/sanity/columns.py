@@ -13,6 +13,7 @@ from truing import _core
 from truing.dynamics.recorded import driven_joints, of_all_rows
 from truing.dynamics.sanity.findings import RecordingFinding, listed, together
 from truing.dynamics.sanity.grids import (
+    FAR_APART,
     MOVES,
     REST_WINDOW,
     SMOOTHING,
@@ -84,6 +85,18 @@ def clock(recordings: Sequence[_core.Recording]) -> tuple[list[RecordingFinding]
         same = [one for one in jitter if one.applied is applied]
         found += together(same, lambda all_, worst: f"{_in(all_, worst)}{worst.evidence}")
     return found, out
+
+
+def slow(recordings: Sequence[_core.Recording]) -> list[RecordingFinding]:
+    """Rows so far apart that what moves between them has to be thought of."""
+    steps = {one.name: usual_step(np.asarray(one.time)) for one in recordings}
+    where = [name for name, step in steps.items() if step > FAR_APART]
+    if not where:
+        return []
+    step = 1000.0 * max(steps.values())
+    words = f"{listed(where)}: rows are up to {step:.3g} ms apart: a smooth curve is laid through the angles,"
+    words += " and torques are compared where they were recorded, without what is faster than rows can show"
+    return [RecordingFinding("slow_rows", tuple(where), (), words, step, "ms", applied=True)]
 
 
 def _evenly_in_time(recording: _core.Recording) -> _core.Recording:

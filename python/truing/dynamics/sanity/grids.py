@@ -21,6 +21,7 @@ SPEED_AT_REST = 0.01  # [rad/s | m/s] as in the core: slower is noise
 STEP = 0.008  # [s] of the grid, at least: checks need no more
 SMOOTHING = 0.1  # [s] half of the stretch whose cubic gives a smoothed value
 REST_WINDOW = 0.25  # [s] on both sides, as in the core
+FAR_APART = 0.024  # [s] between rows, as in the core: motion between them is that of a smooth curve
 GAP = 5.0  # usual steps without a row, as in the core
 MOVES = 0.05  # of a joint's usual largest speed: from here on it moves
 STILL = 0.01  # [rad | m] of range: a joint that stays within does not move
