@@ -2662,8 +2662,8 @@ class SanityFinding:
     def kind(self) -> str:
         """
         'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'length_unit', 'link_unit', 'row_shift',
-        'convention', 'gravity_direction', 'duplicates', 'direction', 'lag', 'moved_target', 'constant' or
-        'outliers'.
+        'convention', 'frame_change', 'gravity_direction', 'duplicates', 'direction', 'lag', 'moved_target',
+        'constant' or 'outliers'.
         """
     @property
     def mistake(self) -> bool:

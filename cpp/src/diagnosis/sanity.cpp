@@ -16,6 +16,7 @@
 #include "math/constants.hpp"
 #include "math/statistics.hpp"
 #include "math/text.hpp"
+#include "model/frame_change.hpp"
 #include "model/readings.hpp"
 #include "model/repeats.hpp"
 
@@ -23,6 +24,7 @@ namespace truing::diagnosis {
 namespace {
 
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
+constexpr double kTwoFrames = 0.3;   ///< of the median error with one frame, that two frames may leave
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 
 /// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
@@ -145,6 +147,47 @@ void choose_record(const Robot& robot, const DiagnoseOptions& options, Checked* 
   out->findings.push_back(finding);
 }
 
+/// Median error of rows `begin` to `end` with base and targets fitted to these alone.
+double median_error_of(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, std::size_t begin,
+                       std::size_t end) {
+  std::vector<double> weights(data.rows, 0.0);
+  for (std::size_t row = begin; row < end; ++row) weights[row] = data.weight ? data.weight[row] : 1.0;
+  Measurements part = data;
+  part.weight = {weights.data(), 1};
+  return median_error(robot, part, options, false);
+}
+
+/// From some row on the instrument stood elsewhere: the poses before and after it agree with the robot, but not with
+/// each other.
+std::optional<SanityFinding> moved_instrument(const Robot& robot, const Measurements& data,
+                                              const DiagnoseOptions& options, double together) {
+  if (!data.position[0] || !data.fixed_point.empty() || robot.targets.size() > 1) return {};
+  const Residuals off = residuals(robot, data, options.own_effects, options.threads);
+  model::Positions measured(static_cast<Eigen::Index>(data.rows), 3);
+  std::vector<std::int32_t> rows;
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    const auto i = static_cast<Eigen::Index>(row);
+    for (int k = 0; k < 3; ++k) measured(i, k) = data.position[static_cast<std::size_t>(k)][row];
+    if (off.position.row(i).allFinite()) rows.push_back(static_cast<std::int32_t>(row));
+  }
+  const std::optional<model::FrameChange> change = model::find_frame_change(measured + off.position, measured, rows);
+  if (!change) return {};
+  const auto moved = static_cast<std::size_t>(change->row);
+  const double apart = std::max(median_error_of(robot, data, options, 0, moved),
+                                median_error_of(robot, data, options, moved, data.rows));
+  if (!(apart < kTwoFrames * together)) return {};
+  SanityFinding out;
+  out.kind = "frame_change";
+  out.text = "from row " + std::to_string(moved + 1) +
+             " on everything was measured from another place: the middle of the poses jumps by " +
+             millimetres(change->move) + ", turned by " + number(change->turn / kDegree, 2) +
+             " deg. Either part by itself leaves a median error of " + millimetres(apart) + " or less, both together " +
+             millimetres(together) + ". Bring all rows into one frame, or diagnose the parts by themselves.";
+  out.rows = {moved};
+  out.mistake = true;
+  return out;
+}
+
 /// Does another reading explain more? Columns of the wrist cost least: they are looked at from `kWorthALook` of the
 /// measured range on, and what nothing explains is said from `kHardlyAnything` on. A mistake is what halves the error
 /// with the geometry fitted, too: then no effect can be named before it is corrected.
@@ -167,6 +210,8 @@ void try_readings(const Robot& robot, const DiagnoseOptions& options, double spr
                    millimetres(as_is) + ". Correct it and run again.";
     finding.mistake = median_error(better->robot, better->data, options, true) <
                       0.5 * better->length_scale * median_error(robot, out->data, options, true);
+  } else if (const std::optional<SanityFinding> moved = moved_instrument(robot, out->data, options, as_is)) {
+    finding = *moved;
   } else if (as_is > kHardlyAnything * spread) {
     finding.kind = "joint_order";
     finding.text = "with base and tool fitted the median error is " + millimetres(as_is) + ", " +

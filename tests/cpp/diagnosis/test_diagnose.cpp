@@ -740,6 +740,24 @@ TEST_CASE("diagnose says how many rows joints and measurements are apart") {
   }
 }
 
+TEST_CASE("diagnose says from which row on the instrument stood elsewhere, and nothing of one that did not") {
+  for (const double move : {0.03, 0.4}) {
+    auto table = measured(light_arm(), 120, 916);
+    for (Column& column : table->data.position) {
+      std::vector<double> moved(120);
+      for (std::size_t row = 0; row < 120; ++row) moved[row] = column[row] + (row < 70 ? 0.0 : move);
+      column = table->add(moved);
+    }
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(move);
+    REQUIRE(finding(d, "frame_change"));
+    CHECK(finding(d, "frame_change")->mistake);
+    CHECK(finding(d, "frame_change")->text.find("from row 71 on") != std::string::npos);
+    CHECK(d.effects.empty());
+  }
+  CHECK_FALSE(finding(diagnose(light_arm(), measured(light_arm(), 120, 916)->data), "frame_change"));
+}
+
 TEST_CASE("diagnose recognises exchanged columns of the wrist, which move the tip little") {
   auto table = measured(light_arm(), 120, 905);
   std::swap(table->data.joints[3], table->data.joints[4]);

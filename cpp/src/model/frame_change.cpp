@@ -1,0 +1,99 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "model/frame_change.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "math/linear_algebra.hpp"
+
+namespace truing::model {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double kApart = 0.1;      ///< of the squares that one frame leaves, at most
+constexpr std::size_t kFewest = 8;  ///< rows of a part: a few that stand out are no frame of their own
+
+/// Sums over rows that a frame is fitted by.
+struct Moments {
+  double n = 0.0, squares = 0.0;
+  Vector3d p = Vector3d::Zero(), m = Vector3d::Zero();
+  Matrix3d products = Matrix3d::Zero();
+
+  void add(const Vector3d& predicted, const Vector3d& measured) {
+    n += 1.0;
+    squares += predicted.squaredNorm() + measured.squaredNorm();
+    p += predicted;
+    m += measured;
+    products += measured * predicted.transpose();
+  }
+  Moments without(const Moments& others) const {
+    Moments out = *this;
+    out.n -= others.n;
+    out.squares -= others.squares;
+    out.p -= others.p;
+    out.m -= others.m;
+    out.products -= others.products;
+    return out;
+  }
+};
+
+/// The rigid motion that carries what is predicted to what was measured (Umeyama 1991, eq. 34 to 43).
+struct Motion {
+  Matrix3d R;
+  double left;  ///< [m^2] squares
+};
+
+Motion motion_of(const Moments& sums) {
+  const Matrix3d covariance = sums.products - sums.m * sums.p.transpose() / sums.n;
+  const double spread = sums.squares - (sums.p.squaredNorm() + sums.m.squaredNorm()) / sums.n;
+  const math::SingularValues svd = math::singular_values(covariance);
+  Vector3d sign = Vector3d::Ones();
+  if ((svd.U * svd.V.transpose()).determinant() < 0.0) sign[2] = -1.0;
+  return {svd.U * sign.asDiagonal() * svd.V.transpose(), std::max(0.0, spread - 2.0 * sign.dot(svd.values))};
+}
+
+}  // namespace
+
+std::optional<FrameChange> find_frame_change(const Positions& predicted, const Positions& measured,
+                                             const std::vector<std::int32_t>& rows) {
+  if (rows.size() < 2 * kFewest) return {};
+  // Sums about a point amid them lose no digits to how far the instrument stands.
+  const Vector3d at_p = predicted.row(rows.front()), at_m = measured.row(rows.front());
+  std::vector<Moments> before(rows.size() + 1);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    before[k + 1] = before[k];
+    before[k + 1].add(predicted.row(rows[k]).transpose() - at_p, measured.row(rows[k]).transpose() - at_m);
+  }
+  const Moments& all = before.back();
+  const double together = motion_of(all).left;
+  double least = kApart * together;
+  std::size_t change = 0;
+  for (std::size_t k = kFewest; k + kFewest <= rows.size(); ++k) {
+    const double left = motion_of(before[k]).left + motion_of(all.without(before[k])).left;
+    if (left >= least) continue;
+    least = left;
+    change = k;
+  }
+  if (change == 0) return {};
+  const Moments first = before[change], second = all.without(first);
+  const Matrix3d R1 = motion_of(first).R, R2 = motion_of(second).R;
+  const Vector3d middle = all.p / all.n;
+  const auto carried = [&](const Moments& part, const Matrix3d& R) -> Vector3d {
+    return part.m / part.n + R * (middle - part.p / part.n);
+  };
+  FrameChange out;
+  out.row = rows[change];
+  out.together = std::sqrt(together / all.n);
+  out.apart = std::sqrt(least / all.n);
+  out.move = (carried(second, R2) - carried(first, R1)).norm();
+  out.turn = Eigen::AngleAxisd(Matrix3d(R2 * R1.transpose())).angle();
+  return out;
+}
+
+}  // namespace truing::model
