@@ -165,12 +165,21 @@ function linkage(at, into) {
   const cranks = alone ? [['', last]] : [['', last - first], ['_first', first], ['_sum', first + last]];
   for (const [suffix, angle] of cranks) {
     const phase = at.parameters[`linkage.${at.name}.phase${suffix}`];
-    if (phase === undefined) continue;
-    const theta = angle + phase, sine = Math.sin(theta);
-    const kept = Math.sign(sine) * Math.max(Math.abs(sine), Math.sin(DEAD_CENTRE));
-    into(`rods${suffix}`, at.name, 1 / kept);
-    into(`arms${suffix}`, at.name, Math.cos(theta) / kept);
+    if (phase !== undefined) bars(at, angle + phase, suffix, 0, into);
   }
+}
+
+// Of a crank at theta; `zero`: what is taken off where the joint was set to zero.
+function bars(at, theta, suffix, zero, into) {
+  const sine = Math.sin(theta);
+  const kept = Math.sign(sine) * Math.max(Math.abs(sine), Math.sin(DEAD_CENTRE));
+  into(`rods${suffix}`, at.name, 1 / kept - zero);
+  into(`arms${suffix}`, at.name, Math.cos(theta) / kept);
+}
+
+function elbowLinkage(at, into) {
+  const phase = at.parameters[`elbow_linkage.${at.name}.phase`];
+  if (phase !== undefined) bars(at, at.now.joints[at.index] + phase, '', 1, into);
 }
 
 function zones(at, into) {
@@ -196,6 +205,7 @@ const LAWS = {
   thermal,
   thermal_zero: (at, into) => into('', at.name, at.warm),
   linkage,
+  elbow_linkage: elbowLinkage,
   neighbour_coupling: (at, into) => at.robot.joints.forEach((other, k) => into(other.name, at.name, at.now.joints[k])),
   joint_coupling: (at, into) => at.robot.joints.forEach((other, k) => into(other.name, at.name, at.now.joints[k])),
 };

@@ -181,14 +181,19 @@ class Builder {
       return true;
     }
     const std::vector<EffectForm> forms = effect.forms(task_.nominal, joint, task_.data);
-    for (const EffectForm& form : forms) add_form(form, e, group);
+    for (const EffectForm& form : forms) add_form(form, e, group, follows_own_angle(effect.traits));
     return !forms.empty();
   }
 
-  /// One form of an effect. A mover that stands still moves nothing.
-  void add_form(const EffectForm& form, Explanation e, const ColumnGroup& group) {
+  /// One form of an effect at a joint. A mover that stands still moves nothing. A law of the joint's own angle holds
+  /// but for a constant: the joint was set to zero with the law's cause in place, and its zero is found with it.
+  void add_form(const EffectForm& form, Explanation e, const ColumnGroup& group, bool with_zero) {
     e.parameters = form.parameters;
     e.constants = form.constants;
+    if (with_zero) {
+      e.model_free = {parameter_of(StandsFor::joint_offset, e.joints[0])};
+      e.requests.push_back({effect_that_stands_for(StandsFor::joint_offset).name, e.joints});
+    }
     add(std::move(e), group);
   }
 

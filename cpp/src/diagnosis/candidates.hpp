@@ -29,7 +29,7 @@ struct Explanation {
   std::string effect;
   std::vector<std::string> joints;
   std::vector<std::string> parameters;        ///< names of its columns
-  std::vector<std::string> model_free;        ///< parameters of the model to free
+  std::vector<std::string> model_free;        ///< parameters of the model to free: a form's has columns as well
   std::vector<EffectRequest> requests;        ///< effects to ask for
   std::map<std::string, double> constants{};  ///< of the effect's form (EffectForm), which the robot is to carry
   std::string note;

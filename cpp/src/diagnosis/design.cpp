@@ -268,6 +268,7 @@ class Designer {
         out_.column_names.push_back(e.parameters[static_cast<std::size_t>(k)]);
         out_.column_units.push_back(grows(e) ? "-" : "rad");  // a form at a joint, as well
       }
+      for (const std::string& name : e.model_free) group.columns.push_back(out_.column(name));
       if (columns.size() == 0)
         out_.x.middleCols(next, count).setZero();
       else

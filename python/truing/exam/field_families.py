@@ -25,7 +25,7 @@ from truing.exam.families import (
     surprise_needs,
     unlisted_effect,
 )
-from truing.exam.kinematics import Chain, Floats, chain_of
+from truing.exam.kinematics import ALPHA, Chain, Floats, chain_of
 from truing.exam.laws import Hidden
 from truing.exam.names import accepted
 from truing.exam.recordings import fit_frames
@@ -248,6 +248,8 @@ def _machine_law(scene: Scene, kind: str, rng: Generator) -> Hidden | None:
         return machine_laws.four_bar(chain, passive[0], [(j, 1.0) for j in crank], rng, named)
     if kind == "elbow_rods":
         elbow = turning[2]
+        if not _parallel(chain, elbow):  # rods turn in one plane
+            return None
         named = (f"q{chain.number(elbow)}",)
         return machine_laws.four_bar(chain, elbow, [(elbow, 1.0)], rng, named)
     if kind == "warm_robot":
@@ -264,6 +266,11 @@ def _machine_law(scene: Scene, kind: str, rng: Generator) -> Hidden | None:
     if kind == "wobble_twice":
         return replace(machine_laws.wobble_twice(joint, rng), inputs=(f"q{chain.number(joint)}",))
     return replace(machine_laws.hard_spring(joint, rng), inputs=(f"torque{chain.number(joint)}",))
+
+
+def _parallel(chain: Chain, joint: int) -> bool:
+    """Whether a joint's axis is parallel to the one before, so that rods can drive it."""
+    return bool(abs(np.sin(chain.links[joint if chain.mdh else joint - 1, ALPHA])) < 0.05)
 
 
 def _short_elbow(plan: Plan, chain: Chain, rng: Generator) -> Plan:

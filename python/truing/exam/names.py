@@ -7,7 +7,7 @@ when the catalogue names one of them otherwise.
 from __future__ import annotations
 
 ACCEPTED: dict[str, tuple[str, ...]] = {
-    "four_bar": ("linkage",),
+    "four_bar": ("linkage", "elbow_linkage"),
     "wobble_twice": ("axis_wobble_twice",),
     "neighbour": ("neighbour_coupling",),
     "warm_robot": ("thermal",),

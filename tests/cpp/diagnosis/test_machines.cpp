@@ -153,6 +153,43 @@ TEST_CASE("diagnose takes two unequal parallelograms for what they are" * doctes
   CHECK(d.after.rms < 1.2 * d.noise_floor);
 }
 
+TEST_CASE("diagnose names the parallelogram that drives an elbow by its exact closure") {
+  const four_bar::Bars bars = {0.9, 0.4006, 0.9004, 0.4};
+  for (const auto& [half, phase] : {std::make_pair(0.7, 1.3), std::make_pair(1.0, 1.57), std::make_pair(0.9, 1.8)}) {
+    Robot robot = arm();
+    robot.joints[2].lower = -half;
+    robot.joints[2].upper = half;
+    const auto rods = hidden("J3", [bars, theta0 = phase](const Inputs& in) {
+      const double theta = theta0 + in.joints[2];
+      return four_bar::rocker_angle(bars, theta) - theta + 1e-3;  // set to zero elsewhere
+    });
+    const auto table = measured(robot, {rods}, 200, 905);
+    const Diagnosis d = diagnose(robot, table->data);
+    CAPTURE(phase);
+    INFO(names(d));
+    REQUIRE(d.effects.size() == 1);
+    CHECK(is_named(d, "elbow_linkage", {"J3"}));
+    CHECK(d.effects[0].identify_as == "elbow_linkage:J3,joint_offset:J3");
+    CHECK(d.unknown.empty());
+    CHECK(d.after.rms < 1.2 * d.noise_floor);
+  }
+}
+
+TEST_CASE("an eccentric encoder at an elbow is not taken for rods alone") {
+  Robot robot = arm();
+  robot.joints[2].lower = -1.2;
+  robot.joints[2].upper = 1.2;
+  const auto encoder = hidden("J3", [](const Inputs& in) { return 4e-4 * std::cos(in.joints[2] + 0.9); });
+  const auto table = measured(robot, {encoder}, 200, 906);
+  const Diagnosis d = diagnose(robot, table->data);
+  INFO(names(d));
+  REQUIRE(d.effects.size() == 1);
+  const std::vector<truing::Alternative>& same = d.effects[0].confounded_with;
+  CHECK((is_named(d, "harmonic", {"J3"}) || std::any_of(same.begin(), same.end(), [](const truing::Alternative& a) {
+           return a.effect == "harmonic" && a.joints == std::vector<std::string>{"J3"};
+         })));
+}
+
 TEST_CASE("diagnose names bearings out of round, and the joint's axis") {
   // The axis leans about a line that turns twice as fast as the joint: oval, not along the catalogue's two directions.
   Effect oval = hidden("J3.alpha", [](const Inputs& in) { return 4e-4 * std::cos(2.0 * in.joints[2] + 0.7); });

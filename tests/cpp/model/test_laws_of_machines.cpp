@@ -135,6 +135,37 @@ TEST_CASE("a parallelogram is square in the middle of its range, unless the robo
   CHECK(carried[0].basis(readings.row(1)) == doctest::Approx(1.0 / std::sin(1.0 - 0.2)));
 }
 
+TEST_CASE(
+    "rods that drive an elbow act where its axis is parallel to the one before, and are right where they are square") {
+  const std::vector<double> elbow = {-0.8, 0.3, 0.9}, still = {0.0, 0.0, 0.0};
+  truing::Measurements data;
+  data.rows = 3;
+  data.joints.assign(6, {still.data(), 1});
+  data.joints[2] = {elbow.data(), 1};
+  truing::Robot robot = arms::ur10();
+  CHECK_THROWS_AS(truing::effect_terms({{"elbow_linkage", {"J2"}}}, robot, data), truing::Unsuited);
+  CHECK_THROWS_AS(truing::effect_terms({{"elbow_linkage", {"J5"}}}, robot, data), truing::Unsuited);
+  CHECK_THROWS_AS(truing::effect_terms({{"elbow_linkage", {"J4"}}}, arms::palletizer(), Crank({{0, 0}}).data),
+                  truing::Unsuited);
+  robot.effects = {{"elbow_linkage", {"J3"}, {{"elbow_linkage.J3.phase", 1.3}}}};
+  const auto terms = truing::effect_terms({{"elbow_linkage", {"J3"}}}, robot, data);
+  REQUIRE(terms.size() == 2);
+  Inputs in;
+  in.data = &data;
+  in.joints = Eigen::VectorXd::Zero(6);
+  for (const double q : elbow) {
+    in.joints[2] = q;
+    CHECK(terms[0].basis(in) == doctest::Approx(1.0 / std::sin(q + 1.3) - 1.0));
+    CHECK(terms[1].basis(in) == doctest::Approx(1.0 / std::tan(q + 1.3)));
+  }
+  in.joints[2] = M_PI / 2.0 - 1.3;
+  CHECK(std::abs(terms[0].basis(in)) < 1e-12);
+  CHECK(std::abs(terms[1].basis(in)) < 1e-12);
+  for (const truing::EffectForm& form : truing::find_effect("elbow_linkage").forms(arms::ur10(), 2, data)) {
+    for (const double q : elbow) CHECK(std::sin(q + form.constants.at("elbow_linkage.J3.phase")) > 0.19);
+  }
+}
+
 TEST_CASE("no crank turns through its dead centres") {
   const Crank readings({{-1.0, -1.2}, {0.0, 0.0}, {1.0, 1.2}});  // the sum of the drivers does
   const auto terms = truing::effect_terms({{"linkage", {"J4"}}}, arms::palletizer(), readings.data);

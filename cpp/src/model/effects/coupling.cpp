@@ -10,6 +10,7 @@
 #include "math/constants.hpp"
 #include "model/effects/families.hpp"
 #include "model/effects/terms.hpp"
+#include "model/gravity.hpp"
 #include "model/motion.hpp"
 
 namespace truing::model {
@@ -46,6 +47,7 @@ struct CrankAngle {
   std::string suffix;
   Eigen::Index first, last;
   double of_first, of_last;
+  bool mastered = false;  ///< the joint was set to zero: it is right where the crank is square
 
   double operator()(const Eigen::VectorXd& joints) const { return of_first * joints[first] + of_last * joints[last]; }
 };
@@ -78,21 +80,21 @@ std::pair<double, double> range_of(const CrankAngle& angle, const Robot& robot, 
 // No parallelogram comes nearer to its dead centres, where all bars lie in line [rad].
 constexpr double kDeadCentre = 0.2;
 
-std::string phase_name(const Joint& at, const CrankAngle& angle) {
-  return "linkage." + at.name + ".phase" + angle.suffix;
+std::string name_of(const char* effect, const Joint& at, const char* part, const CrankAngle& angle) {
+  return std::string(effect) + "." + at.name + "." + part + angle.suffix;
 }
 
-std::vector<Term> terms_of_linkage(const Joint& at, const CrankAngle& angle, double phase) {
+std::vector<Term> terms_of_bars(const char* effect, const Joint& at, const CrankAngle& angle, double phase) {
   const auto law = [angle, phase](const Inputs& in, bool rods) {
     const double theta = angle(in.joints) + phase;
     const double sine = std::copysign(std::max(std::abs(std::sin(theta)), std::sin(kDeadCentre)), std::sin(theta));
-    return (rods ? 1.0 : std::cos(theta)) / sine;
+    return rods ? 1.0 / sine - (angle.mastered ? 1.0 : 0.0) : std::cos(theta) / sine;
   };
   std::vector<Term> terms;
   for (const bool rods : {true, false}) {
-    terms.push_back(make_term("linkage." + at.name + (rods ? ".rods" : ".arms") + angle.suffix, motion_unit(at),
-                              at.name, [law, rods](const Inputs& in) { return law(in, rods); }));
-    terms.back().constants = {{phase_name(at, angle), phase}};
+    terms.push_back(make_term(name_of(effect, at, rods ? "rods" : "arms", angle), motion_unit(at), at.name,
+                              [law, rods](const Inputs& in) { return law(in, rods); }));
+    terms.back().constants = {{name_of(effect, at, "phase", angle), phase}};
   }
   return terms;
 }
@@ -106,43 +108,84 @@ std::vector<Term> terms_of_linkage(const Joint& at, const CrankAngle& angle, dou
 // Two parameters: `rods` = (dl - dc) / r and `arms` = (dr_rocker - dr_crank) / r. theta is a sum of readings plus a
 // phase, where the base bar points. Nobody says it: the middle of the range is taken for square, as it is built, unless
 // the robot carries the phases of some parallelograms, which then are all there are.
-std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
-  const Joint& at = robot.joints.at(joint);
+std::vector<Term> unequal_bars(const char* effect, const Robot& robot, std::size_t joint,
+                               const std::vector<CrankAngle>& angles, const Measurements& data) {
+  const Joint& at = robot.joints[joint];
   std::vector<Term> known, usual;
-  for (const CrankAngle& angle : crank_angles(robot, at)) {
-    const double phase = remembered(robot, "linkage", phase_name(at, angle), [] { return kNaN; });
+  for (const CrankAngle& angle : angles) {
+    const double phase = remembered(robot, effect, name_of(effect, at, "phase", angle), [] { return kNaN; });
     const auto [low, high] = range_of(angle, robot, data);
     const bool passes_dead_centre = high - low > kPi - 2.0 * kDeadCentre;
     if (!std::isfinite(phase) && passes_dead_centre) continue;  // no crank turns that far
     const std::vector<Term> terms =
-        terms_of_linkage(at, angle, std::isfinite(phase) ? phase : kPi / 2.0 - 0.5 * (low + high));
+        terms_of_bars(effect, at, angle, std::isfinite(phase) ? phase : kPi / 2.0 - 0.5 * (low + high));
     (std::isfinite(phase) ? known : usual)
         .insert((std::isfinite(phase) ? known : usual).end(), terms.begin(), terms.end());
   }
   if (known.empty() && usual.empty())
-    unsuited("linkage", at,
-             "needs a crank that stays clear of its dead centres; every angle of the drivers passes one");
+    unsuited(effect, at, "needs a crank that stays clear of its dead centres; every angle of the drivers passes one");
   return known.empty() ? usual : known;
 }
 
 // Every phase that keeps the crank clear of its dead centres, in steps that a law hardly changes over.
-std::vector<EffectForm> phases_of_linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
-  constexpr double kStep = 0.13;  // [rad]
+std::vector<EffectForm> phases_of_bars(const char* effect, const Robot& robot, std::size_t joint,
+                                       const std::vector<CrankAngle>& angles, const Measurements& data) {
+  constexpr double kStep = 0.065;  // [rad]
   const Joint& at = robot.joints.at(joint);
   std::vector<EffectForm> forms;
-  for (const CrankAngle& angle : crank_angles(robot, at)) {
-    const std::string prefix = "linkage." + at.name;
+  for (const CrankAngle& angle : angles) {
     const auto [low, high] = range_of(angle, robot, data);
     const double least = kDeadCentre - low, most = kPi - kDeadCentre - high;
     if (least > most) continue;
     const int steps = std::max(2, 2 * static_cast<int>(std::ceil(0.5 * (most - least) / kStep)));
     for (int k = 0; k <= steps; ++k) {  // from square outwards
       const int step = steps / 2 + (k % 2 ? 1 : -1) * ((k + 1) / 2);
-      forms.push_back({{prefix + ".rods" + angle.suffix, prefix + ".arms" + angle.suffix},
-                       {{phase_name(at, angle), least + (most - least) * step / steps}}});
+      forms.push_back({{name_of(effect, at, "rods", angle), name_of(effect, at, "arms", angle)},
+                       {{name_of(effect, at, "phase", angle), least + (most - least) * step / steps}}});
     }
   }
   return forms;
+}
+
+constexpr const char* kLinkage = "linkage";
+
+std::vector<Term> linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
+  return unequal_bars(kLinkage, robot, joint, crank_angles(robot, robot.joints.at(joint)), data);
+}
+
+std::vector<EffectForm> phases_of_linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
+  return phases_of_bars(kLinkage, robot, joint, crank_angles(robot, robot.joints.at(joint)), data);
+}
+
+// The motor of an elbow stands at the shoulder and drives it by a rod along the upper arm. Shoulder, crank and rocker
+// turn about parallel axes, the upper arm is the base bar, and crank and rocker stand at the elbow's own angle to it.
+constexpr const char* kElbowLinkage = "elbow_linkage";
+
+bool is_parallel_to_last_axis(const Robot& robot, std::size_t joint) {
+  constexpr double kParallel = 5.0 * kDegree;
+  if (joint == 0 || !is_revolute(robot.joints[joint - 1])) return false;
+  const auto driven = static_cast<Eigen::Index>(robot.driven_joints().size());
+  const std::vector<Eigen::Isometry3d> frames = forward_kinematics(robot, Eigen::VectorXd::Zero(driven));
+  const Eigen::Vector3d last = joint_axis(robot, frames, joint - 1).direction;
+  return last.cross(joint_axis(robot, frames, joint).direction).norm() < std::sin(kParallel);
+}
+
+std::vector<CrankAngle> crank_of_elbow(const Robot& robot, std::size_t joint) {
+  const Joint& at = robot.joints.at(joint);
+  require_driven(kElbowLinkage, at);
+  require_revolute(kElbowLinkage, at, "");
+  if (!is_parallel_to_last_axis(robot, joint))
+    unsuited(kElbowLinkage, at, "needs an axis parallel to the one before: rods turn in one plane");
+  const auto own = static_cast<Eigen::Index>(joint);
+  return {{"", own, own, 0.0, 1.0, true}};
+}
+
+std::vector<Term> elbow_linkage(const Robot& robot, std::size_t joint, const Measurements& data) {
+  return unequal_bars(kElbowLinkage, robot, joint, crank_of_elbow(robot, joint), data);
+}
+
+std::vector<EffectForm> phases_of_elbow(const Robot& robot, std::size_t joint, const Measurements& data) {
+  return phases_of_bars(kElbowLinkage, robot, joint, crank_of_elbow(robot, joint), data);
 }
 
 // The motor of one joint is carried by another, or its belt runs over that one: turning that one turns this one a
@@ -192,7 +235,7 @@ Effect joint_coupling_effect() {
 }
 
 Effect linkage_effect() {
-  Effect effect{"linkage", "bars of a parallelogram are not equal: error of the passive joint", linkage};
+  Effect effect{kLinkage, "bars of a parallelogram are not equal: error of the passive joint", linkage};
   EffectTraits& traits = effect.traits;
   traits.driver = Driver::other_angles;
   traits.usual = 5e-4;
@@ -207,6 +250,25 @@ Effect linkage_effect() {
       "`linkage.J4.rods`, `.arms`, `.rods_first` … [rad]",
       "a passive joint; a crank that stays clear of its dead centres"};
   effect.forms = phases_of_linkage;
+  return effect;
+}
+
+Effect elbow_linkage_effect() {
+  Effect effect{kElbowLinkage, "bars of the parallelogram that drives an elbow are not equal", elbow_linkage};
+  EffectTraits& traits = effect.traits;
+  traits.driver = Driver::angle;
+  traits.law = Law::of_angle;
+  traits.separated_by = {{Experiment::own_words, "", "look whether a rod drives the joint; use its full range"}};
+  traits.usual = 5e-4;
+  traits.plausible = 1e-2;
+  traits.main_part = "rods";
+  traits.documentation = {
+      "(a (1 − sin θ) + b cos θ) / sin θ on a joint that a rod along the link before it drives, θ "
+      "the joint's angle and a phase; a, b as of `linkage`",
+      "`elbow_linkage.J3.rods`, `.arms` [rad]",
+      "a driven joint whose axis is parallel to the one before; a crank that stays clear of its "
+      "dead centres"};
+  effect.forms = phases_of_elbow;
   return effect;
 }
 
@@ -226,7 +288,7 @@ Effect neighbour_coupling_effect() {
 }  // namespace
 
 std::vector<Effect> coupling_effects() {
-  return {joint_coupling_effect(), linkage_effect(), neighbour_coupling_effect()};
+  return {joint_coupling_effect(), linkage_effect(), elbow_linkage_effect(), neighbour_coupling_effect()};
 }
 
 }  // namespace truing::model
