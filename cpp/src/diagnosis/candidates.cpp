@@ -181,16 +181,16 @@ class Builder {
       return true;
     }
     const std::vector<EffectForm> forms = effect.forms(task_.nominal, joint, task_.data);
-    for (const EffectForm& form : forms) add_form(form, e, group, follows_own_angle(effect.traits));
+    for (const EffectForm& form : forms) add_form(form, e, group);
     return !forms.empty();
   }
 
-  /// One form of an effect at a joint. A mover that stands still moves nothing. A law of the joint's own angle holds
+  /// One form of an effect at a joint. A mover that stands still moves nothing. A law about a phase of its own holds
   /// but for a constant: the joint was set to zero with the law's cause in place, and its zero is found with it.
-  void add_form(const EffectForm& form, Explanation e, const ColumnGroup& group, bool with_zero) {
+  void add_form(const EffectForm& form, Explanation e, const ColumnGroup& group) {
     e.parameters = form.parameters;
     e.constants = form.constants;
-    if (with_zero) {
+    if (!form.constants.empty()) {
       e.model_free = {parameter_of(StandsFor::joint_offset, e.joints[0])};
       e.requests.push_back({effect_that_stands_for(StandsFor::joint_offset).name, e.joints});
     }
