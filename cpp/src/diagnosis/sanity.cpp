@@ -19,6 +19,7 @@
 #include "model/frame_change.hpp"
 #include "model/readings.hpp"
 #include "model/repeats.hpp"
+#include "model/row_slip.hpp"
 
 namespace truing::diagnosis {
 namespace {
@@ -27,19 +28,24 @@ constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
 constexpr double kTwoFrames = 0.3;   ///< of the median error with one frame, that two frames may leave
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 
-/// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
-double median_error(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, bool geometry) {
-  const RowSample sample = sample_of(data, kRows);
-  Measurements some = data;
-  some.weight = {sample.weights.data(), 1};
-  some.set.assign(data.rows, 0);
+/// What base and targets are fitted by, before statistics.
+IdentifyOptions frames_alone(const Robot& robot, const DiagnoseOptions& options) {
   IdentifyOptions fit;
   fit.test_share = 0.0;
   fit.own_effects = options.own_effects;
   fit.threads = options.threads;
   fit.max_iterations = 60;
   fit.free = targets_of(robot);
-  const Identification frames = identify(robot, some, fit);
+  return fit;
+}
+
+/// Median error with base and targets fitted and, if wanted, the geometry under its prior: a few hundred rows will do.
+double median_error(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, bool geometry) {
+  const RowSample sample = sample_of(data, kRows);
+  Measurements some = data;
+  some.weight = {sample.weights.data(), 1};
+  some.set.assign(data.rows, 0);
+  const Identification frames = identify(robot, some, frames_alone(robot, options));
   if (!geometry) return frames.train.after.median;
   const Linearisation found = linearise(frames.robot, some, sample.rows, options.rotation_length, options.threads);
   const Residuals left = residuals(found.at, some, options.own_effects, options.threads);
@@ -188,6 +194,30 @@ std::optional<SanityFinding> moved_instrument(const Robot& robot, const Measurem
   return out;
 }
 
+/// A row that one of two records lacks, or has twice: from there on the other pairing is beyond doubt, and taken.
+void undo_slip(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
+  FramesFit frames;
+  frames.fit = [&](const Measurements& data) {
+    Measurements all = data;
+    all.set.assign(data.rows, 0);
+    return identify(robot, all, frames_alone(robot, options)).robot;
+  };
+  frames.errors = [&](const Robot& fitted, const Measurements& data) {
+    return lengths_of(residuals(fitted, data, options.own_effects, options.threads), data.rows);
+  };
+  const std::optional<RowSlip> slip = find_row_slip(out->data, frames);
+  if (!slip) return;
+  out->data = with_slip_undone(out->data, *slip);
+  const auto [first, last] = rows_in_doubt(out->data, *slip);
+  SanityFinding finding;
+  finding.kind = "row_shift";
+  finding.text = text_of(*slip) + " (" + millimetres(slip->after) + " in place of " + millimetres(slip->before) +
+                 " from there on, by base and tool alone). The diagnosis goes on with that, without rows " +
+                 std::to_string(first + 1) + " to " + std::to_string(last) + ". Correct the file.";
+  for (std::size_t row = first; row < last; ++row) finding.rows.push_back(row);
+  out->findings.push_back(finding);
+}
+
 /// Does another reading explain more? Columns of the wrist cost least: they are looked at from `kWorthALook` of the
 /// measured range on, and what nothing explains is said from `kHardlyAnything` on. A mistake is what halves the error
 /// with the geometry fitted, too: then no effect can be named before it is corrected.
@@ -247,6 +277,7 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
                                 " poses are too few to diagnose anything: measure at least 12, better 100");
   find_duplicates(data, &out.findings);
   choose_record(robot, options, &out);
+  undo_slip(robot, options, &out);
   std::vector<std::int32_t> rows(data.rows);
   std::iota(rows.begin(), rows.end(), 0);
   const double range = measured_range(data, rows);

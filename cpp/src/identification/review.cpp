@@ -16,6 +16,7 @@
 #include "model/motion.hpp"
 #include "model/readings.hpp"
 #include "model/repeats.hpp"
+#include "model/row_slip.hpp"
 #include "rooms.hpp"
 
 namespace truing {
@@ -50,6 +51,13 @@ std::vector<std::int32_t> fitted_rows(const Identification& found) {
     if (found.set[row] == 0 && rejected.count(row) == 0) out.push_back(static_cast<std::int32_t>(row));
   }
   return out;
+}
+
+/// As many as the rows after a missing one might be: a fit that bears gross errors may be none the worse for them.
+bool has_rows_far_out(const Identification& found) {
+  constexpr std::size_t kSeveral = 8;
+  constexpr double kFarOut = 10.0;
+  return found.rejected_rows.size() >= kSeveral || found.train.after.p95 > kFarOut * found.train.after.median;
 }
 
 /// By how much a parameter changed; whole turns are none.
@@ -133,6 +141,31 @@ class Trials {
 
   /// Median error with base and targets fitted alone. [m]
   double error(const Robot& robot, const Measurements& data) const {
+    return identify(robot, thinned(data), frames_alone(robot)).train.after.median;
+  }
+
+  /// From where on joints and measurements are some rows apart, if they are.
+  std::optional<RowSlip> slip(const Robot& robot, const Measurements& data) const {
+    FramesFit frames;
+    frames.fit = [&](const Measurements& rows) {
+      Measurements all = rows;
+      all.set.assign(rows.rows, 0);
+      return identify(robot, all, frames_alone(robot)).robot;
+    };
+    frames.errors = [&](const Robot& fitted, const Measurements& rows) {
+      const Residuals left = residuals(fitted, rows, options_.own_effects, options_.threads);
+      std::vector<double> lengths(rows.rows);
+      for (std::size_t row = 0; row < rows.rows; ++row) {
+        const auto i = static_cast<Eigen::Index>(row);
+        lengths[row] = rows.has_distance(row) ? std::abs(left.distance[i]) : left.position.row(i).norm();
+      }
+      return lengths;
+    };
+    return find_row_slip(data, frames);
+  }
+
+ private:
+  IdentifyOptions frames_alone(const Robot& robot) const {
     IdentifyOptions frames = options_;
     frames.free.clear();
     for (const Target& target : robot.targets) frames.free.push_back(target.name + ".*");
@@ -140,10 +173,9 @@ class Trials {
     frames.effects.clear();
     frames.priors.clear();
     frames.max_iterations = std::min(frames.max_iterations, kIterations);
-    return identify(robot, thinned(data), frames).train.after.median;
+    return frames;
   }
 
- private:
   Measurements thinned(const Measurements& data) const {
     Measurements out = data;
     out.weight = {sample_.weights.data(), 1};
@@ -205,6 +237,16 @@ Mistake explained_by(const Tried& best, double as_is, std::vector<Parameter> cha
   return out;
 }
 
+Mistake slipped(const RowSlip& slip, std::vector<Parameter> changes) {
+  Mistake out;
+  out.kind = "row_shift";
+  out.text = text_of(slip) + ": that leaves a median error of " + millimetres(slip.after) +
+             " from there on in place of " + millimetres(slip.before) +
+             " with base and tool fitted. Correct it and run again.";
+  out.changes = std::move(changes);
+  return out;
+}
+
 Mistake unexplained(std::vector<Parameter> changes) {
   Mistake out;
   out.kind = "unexplained";
@@ -224,8 +266,10 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
   const Workshop workshop(nominal, data);
   std::vector<Parameter> changes = workshop.changes(found);
   const bool much_left = found.train.after.median > kWorthALook * measured_range(data, fitted_rows(found));
-  if (changes.empty() && !much_left) return std::nullopt;
+  if (changes.empty() && !much_left && !has_rows_far_out(found)) return std::nullopt;
   const Trials trials(data, options);
+  if (const std::optional<RowSlip> slip = trials.slip(nominal, data)) return slipped(*slip, std::move(changes));
+  if (changes.empty() && !much_left) return std::nullopt;
   const double as_is = trials.error(nominal, data);
   const double fitted = found.train.after.median;
   for (const Tried& tried : better_readings(nominal, data, trials, as_is)) {

@@ -72,40 +72,6 @@ void add_joint_readings(const Robot& robot, const Measurements& data, Readings* 
   }
 }
 
-/// The joints of every row with what was measured `shift` rows further down. Rows that have no such row are the last
-/// one that has, once more.
-Measurements with_rows_shifted(const Measurements& data, int shift) {
-  const auto last = static_cast<std::ptrdiff_t>(data.rows) - 1;
-  std::vector<std::size_t> joints_of, measured_of;
-  for (std::ptrdiff_t row = 0; row <= last; ++row) {
-    const std::ptrdiff_t paired = std::clamp<std::ptrdiff_t>(row, std::max(0, -shift), last - std::max(0, shift));
-    joints_of.push_back(static_cast<std::size_t>(paired));
-    measured_of.push_back(static_cast<std::size_t>(paired + shift));
-  }
-  const auto taken = [](const auto& column, const std::vector<std::size_t>& rows) {
-    std::vector<std::decay_t<decltype(column[0])>> out;
-    for (const std::size_t row : rows) out.push_back(column[row]);
-    return out;
-  };
-  std::vector<std::vector<double>> joints;
-  for (const Column& column : data.joints) joints.push_back(taken(column, joints_of));
-  Measurements out = with_joint_columns(data, std::move(joints));
-  auto owned = std::make_shared<OtherColumns>(OtherColumns{out.owner, {}});
-  std::vector<Column*> measured = {&out.position[0], &out.position[1], &out.position[2], &out.distance};
-  for (Column& column : out.orientation) measured.push_back(&column);
-  owned->columns.reserve(measured.size());
-  for (Column* column : measured) {
-    if (!*column) continue;
-    owned->columns.push_back(taken(*column, measured_of));
-    *column = {owned->columns.back().data(), 1};
-  }
-  for (std::vector<std::int32_t>* index : {&out.target, &out.fixed_point}) {
-    if (!index->empty()) *index = taken(*index, measured_of);
-  }
-  out.owner = owned;
-  return out;
-}
-
 /// One of two records that were joined row by row has a few rows more than the other at its beginning.
 void add_row_readings(const Robot& robot, const Measurements& data, Readings* out) {
   constexpr int kRowsOff = 3;
@@ -184,6 +150,43 @@ Measurements with_joint_columns(const Measurements& data, std::vector<std::vecto
   for (std::size_t k = 0; k < owned->columns.size(); ++k) out.joints[k] = {owned->columns[k].data(), 1};
   out.owner = owned;
   return out;
+}
+
+Measurements with_rows_paired(const Measurements& data, const std::vector<std::size_t>& joints_of,
+                              const std::vector<std::size_t>& measured_of) {
+  const auto taken = [](const auto& column, const std::vector<std::size_t>& rows) {
+    std::vector<std::decay_t<decltype(column[0])>> out;
+    for (const std::size_t row : rows) out.push_back(column[row]);
+    return out;
+  };
+  std::vector<std::vector<double>> joints;
+  for (const Column& column : data.joints) joints.push_back(taken(column, joints_of));
+  Measurements out = with_joint_columns(data, std::move(joints));
+  auto owned = std::make_shared<OtherColumns>(OtherColumns{out.owner, {}});
+  std::vector<Column*> measured = {&out.position[0], &out.position[1], &out.position[2], &out.distance};
+  for (Column& column : out.orientation) measured.push_back(&column);
+  owned->columns.reserve(measured.size());
+  for (Column* column : measured) {
+    if (!*column) continue;
+    owned->columns.push_back(taken(*column, measured_of));
+    *column = {owned->columns.back().data(), 1};
+  }
+  for (std::vector<std::int32_t>* index : {&out.target, &out.fixed_point}) {
+    if (!index->empty()) *index = taken(*index, measured_of);
+  }
+  out.owner = owned;
+  return out;
+}
+
+Measurements with_rows_shifted(const Measurements& data, int shift) {
+  const auto last = static_cast<std::ptrdiff_t>(data.rows) - 1;
+  std::vector<std::size_t> joints_of, measured_of;
+  for (std::ptrdiff_t row = 0; row <= last; ++row) {
+    const std::ptrdiff_t paired = std::clamp<std::ptrdiff_t>(row, std::max(0, -shift), last - std::max(0, shift));
+    joints_of.push_back(static_cast<std::size_t>(paired));
+    measured_of.push_back(static_cast<std::size_t>(paired + shift));
+  }
+  return with_rows_paired(data, joints_of, measured_of);
 }
 
 double measured_range(const Measurements& data, const std::vector<std::int32_t>& rows) {

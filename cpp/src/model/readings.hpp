@@ -27,6 +27,12 @@ struct Reading {
 /// when it is called, since it copies columns; robot and data must outlive them.
 std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Measurements& data);
 
+/// The joints of every row with what was measured `shift` rows further down. Rows that have no such row are the last
+/// one that has, once more. `with_rows_paired`: of every row, whose joints, and what was measured in which one.
+Measurements with_rows_shifted(const Measurements& data, int shift);
+Measurements with_rows_paired(const Measurements& data, const std::vector<std::size_t>& joints_of,
+                              const std::vector<std::size_t>& measured_of);
+
 /// Rows that are enough to compare readings by: every so many, the others with weight zero. It must outlive what uses
 /// its weights.
 struct RowSample {

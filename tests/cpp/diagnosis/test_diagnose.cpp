@@ -758,6 +758,52 @@ TEST_CASE("diagnose says from which row on the instrument stood elsewhere, and n
   CHECK_FALSE(finding(diagnose(light_arm(), measured(light_arm(), 120, 916)->data), "frame_change"));
 }
 
+/// What was measured in each row is what was measured in row `from(row)`.
+static void measure_again(Table* table, const std::function<std::size_t(std::size_t)>& from) {
+  for (Column& column : table->data.position) {
+    std::vector<double> moved(table->data.rows);
+    for (std::size_t row = 0; row < moved.size(); ++row) moved[row] = column[from(row)];
+    column = table->add(moved);
+  }
+}
+
+TEST_CASE("diagnose goes on with the rows after one that is missing, or measured twice") {
+  for (const int shift : {-2, -1, 1, 3}) {
+    for (const std::size_t at : {std::size_t{30}, std::size_t{104}}) {
+      auto table = measured(light_arm(), 120, 917);
+      const Diagnosis right = diagnose(light_arm(), table->data);
+      measure_again(table.get(), [&](std::size_t row) {
+        const std::size_t paired = row < at ? row : row - static_cast<std::size_t>(shift + 200) + 200;
+        return std::min<std::size_t>(paired, 119);
+      });
+      const Diagnosis d = diagnose(light_arm(), table->data);
+      CAPTURE(shift);
+      CAPTURE(at);
+      REQUIRE(finding(d, "row_shift"));
+      CHECK_FALSE(finding(d, "row_shift")->mistake);
+      CHECK(finding(d, "row_shift")->rows.size() == static_cast<std::size_t>(2 * std::abs(shift)));
+      const std::size_t first = finding(d, "row_shift")->rows.front(), last = finding(d, "row_shift")->rows.back();
+      CHECK(first <= at);
+      CHECK(at <= last + 1);
+      CHECK(finding(d, "row_shift")->text.find(shift > 0 ? "further down" : "further up") != std::string::npos);
+      CHECK(d.gap.rms < 1.3 * right.gap.rms);
+    }
+  }
+}
+
+TEST_CASE("rows far out, a section of another frame, measured again or in repeats are no missing row") {
+  const auto clean = measured(light_arm(), 120, 918);
+  CHECK_FALSE(finding(diagnose(light_arm(), clean->data), "row_shift"));
+  auto moved = measured(light_arm(), 120, 918);
+  std::vector<double> other_frame(120);
+  for (std::size_t row = 0; row < 120; ++row) other_frame[row] = moved->data.position[1][row] + (row < 80 ? 0.0 : 0.05);
+  moved->data.position[1] = moved->add(other_frame);
+  CHECK_FALSE(finding(diagnose(light_arm(), moved->data), "row_shift"));
+  auto exchanged = measured(light_arm(), 120, 918);  // a section in the wrong order
+  measure_again(exchanged.get(), [](std::size_t row) { return row < 60 || row >= 80 ? row : 139 - row; });
+  CHECK_FALSE(finding(diagnose(light_arm(), exchanged->data), "row_shift"));
+}
+
 TEST_CASE("diagnose recognises exchanged columns of the wrist, which move the tip little") {
   auto table = measured(light_arm(), 120, 905);
   std::swap(table->data.joints[3], table->data.joints[4]);

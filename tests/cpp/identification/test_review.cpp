@@ -108,6 +108,19 @@ TEST_CASE("measurements that are a row off their joints are found on every arm")
   }
 }
 
+TEST_CASE("a measurement that is missing in the middle is found on every arm") {
+  for (const Robot& robot : some_arms()) {
+    const auto table = measured(robot, 150, 141);
+    for (Column& column : table->data.position) {
+      std::vector<double> without;
+      for (std::size_t row = 0; row < 150; ++row) without.push_back(column[row < 90 || row == 149 ? row : row + 1]);
+      column = table->add(without);
+    }
+    check_said(robot, table->data, "row_shift", "from row 9");
+    check_said(robot, table->data, "row_shift", "1 row further up");
+  }
+}
+
 TEST_CASE("links by the other convention are found") {
   for (const Robot& robot : some_arms()) {
     if (robot.convention == Convention::urdf) continue;

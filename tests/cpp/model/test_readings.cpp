@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 #include "model/readings.hpp"
+#include "model/row_slip.hpp"
 
 #include <doctest/doctest.h>
 
@@ -58,6 +59,26 @@ TEST_CASE("rows that are shifted pair every row's joints with what was measured 
       CHECK(reading.data.position[2][row] - reading.data.joints[0][row] == apart.back());
   }
   CHECK(apart == std::vector<double>{-3.0, -2.0, -1.0, 1.0, 2.0, 3.0});
+}
+
+TEST_CASE("an undone slip pairs rows from there on anew, and those in doubt do not count") {
+  for (const int shift : {-2, 1}) {
+    Table table(20);
+    std::vector<double> count;
+    for (int row = 0; row < 20; ++row) count.push_back(row);
+    table.data.joints = {table.add(count)};
+    for (Column& column : table.data.position) column = table.add(count);
+    const Measurements undone = truing::model::with_slip_undone(table.data, {10, shift, 0.0, 0.0});
+    const int by = std::abs(shift);
+    for (int row = 0; row < 20; ++row) {
+      const auto i = static_cast<std::size_t>(row);
+      const bool sure = (row < 10 - by || row >= 10 + by) && (row < 10 || row + shift < 20);
+      CAPTURE(row);
+      CHECK(undone.weight[i] == (sure ? 1.0 : 0.0));
+      const bool after = sure ? row >= 10 : undone.joints[0][i] >= 10.0;
+      CHECK(undone.position[0][i] - undone.joints[0][i] == (after ? shift : 0));
+    }
+  }
 }
 
 TEST_CASE("the stretched length adds up the links of tables and of joint origins") {
