@@ -199,21 +199,43 @@ bool Search::is_plausible(const Evidence::State& state, int group) const {
   return true;
 }
 
-Choice Search::better_forms(Choice choice) const {
+std::vector<Evidence::Gain> Search::forms_of(const Choice& choice, std::size_t at) const {
+  const TorqueGroup& mine = design_.groups[static_cast<std::size_t>(choice.groups[at])];
+  const Evidence::State& less = state(without(choice, at));
+  std::vector<Evidence::Gain> out;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    if (!same_place(design_.groups[g], mine) || groups_[g].shadow) continue;
+    Evidence::Gain form = evidence_.gain(less, groups_[g].columns, groups_[g].cost);
+    form.group = static_cast<int>(g);
+    if (form.score > 0.0) out.push_back(form);
+  }
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+  return out;
+}
+
+/// A form that no machine has makes way for one that machines have where this explains nearly as much; where it wins
+/// over all of these it stays, and is refused at the end: what is there is something else.
+Choice Search::in_best_form(const Choice& choice, std::size_t at, const SearchLimits& limits) const {
+  const std::vector<Evidence::Gain> forms = forms_of(choice, at);
+  if (forms.empty()) return choice;
+  const auto in_form = [&](const Evidence::Gain& form) {
+    Choice other = choice;
+    other.groups[at] = form.group;
+    other.scales[at] = form.scale;
+    return other;
+  };
+  for (const Evidence::Gain& form : forms) {
+    if (form.score < forms.front().score - limits.threshold) break;
+    Choice other = in_form(form);
+    if (!limits.plausible_only || is_plausible(state(other), form.group)) return other;
+  }
+  return in_form(forms.front());
+}
+
+Choice Search::better_forms(Choice choice, const SearchLimits& limits) const {
   for (std::size_t at = 0; at < choice.groups.size(); ++at) {
     const TorqueGroup& mine = design_.groups[static_cast<std::size_t>(choice.groups[at])];
-    if (mine.forms < 2 || mine.effect.empty()) continue;
-    const Evidence::State& less = state(without(choice, at));
-    Evidence::Gain best;
-    for (std::size_t g = 0; g < groups_.size(); ++g) {
-      if (!same_place(design_.groups[g], mine) || groups_[g].shadow) continue;
-      Evidence::Gain gain = evidence_.gain(less, groups_[g].columns, groups_[g].cost);
-      gain.group = static_cast<int>(g);
-      if (gain.score > best.score) best = gain;
-    }
-    if (best.group < 0) continue;
-    choice.groups[at] = best.group;
-    choice.scales[at] = best.scale;
+    if (mine.forms > 1 && !mine.effect.empty()) choice = in_best_form(choice, at, limits);
   }
   return choice;
 }
@@ -263,7 +285,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
       break;
     }
     if (!taken) break;
-    choice = better_forms(std::move(choice));
+    choice = better_forms(std::move(choice), limits);
   }
   return less_what_is_idle(std::move(choice), limits, free_functions);
 }

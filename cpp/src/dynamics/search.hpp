@@ -98,7 +98,10 @@ class Search {
   Look& look(const Choice& choice) const;
 
   bool may_enter(const Choice& choice, int group, const SearchLimits& limits, bool free_functions) const;
-  Choice better_forms(Choice choice) const;
+  /// Forms of the effect of group number `at` in its place that explain anything, the best first.
+  std::vector<Evidence::Gain> forms_of(const Choice& choice, std::size_t at) const;
+  Choice in_best_form(const Choice& choice, std::size_t at, const SearchLimits& limits) const;
+  Choice better_forms(Choice choice, const SearchLimits& limits) const;
   /// Of effects or, where these were searched for, of free functions.
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits, bool free_functions) const;
   bool is_plausible(const Evidence::State& state, int group) const;

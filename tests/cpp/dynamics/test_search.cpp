@@ -95,3 +95,63 @@ TEST_CASE("a fold is judged as by a dense fit to the others") {
     }
   }
 }
+
+namespace {
+
+/// One effect in two forms, whose values must be positive, at one joint. The torque is that of the first form, and of
+/// what only the second one, less than nothing of it, makes.
+struct TwoForms {
+  TorqueDesign design;
+  Sums sums;
+
+  explicit TwoForms(double of_second_alone) {
+    std::mt19937_64 random(11);
+    std::normal_distribution<double> normal(0.0, 1.0);
+    auto grams = std::make_shared<std::vector<JointGrams>>();
+    grams->push_back({{0, 1}, {}});
+    for (int f = 0; f < 4; ++f) {
+      Eigen::MatrixXd x(40, 2);
+      Eigen::VectorXd y(40);
+      for (Eigen::Index row = 0; row < 40; ++row) {
+        const double first = normal(random), alone = normal(random);
+        x.row(row) << first, -first + alone;
+        y[row] = first - of_second_alone * alone + normal(random);
+      }
+      grams->back().folds.push_back({x.transpose() * x, x.transpose() * y, y.squaredNorm(), 40.0});
+    }
+    for (int form = 0; form < 2; ++form) {
+      TorqueTerm term;
+      term.joints = {0};
+      term.least = 0.0;
+      design.terms.push_back(term);
+      TorqueGroup group;
+      group.effect = "law";
+      group.joints = {"J1"};
+      group.joint = 0;
+      group.forms = 2;
+      group.columns = {form};
+      design.groups.push_back(group);
+    }
+    const std::vector<Noise> noise(1);
+    for (std::size_t f = 0; f < 4; ++f) sums.folds.emplace_back(grams, f, noise);
+    sums.all = sum_of_folds(*grams, noise, 2);
+    sums.precision = Eigen::VectorXd::Zero(2);
+  }
+
+  std::vector<int> found() const { return dynamics::Search(design, sums, {}).run({}, {}, false).groups; }
+};
+
+}  // namespace
+
+TEST_CASE("a form that no machine has takes no place where one that machines have explains as much") {
+  const TwoForms alike(0.5);
+  const dynamics::Search search(alike.design, alike.sums, {});
+  const std::vector<Evidence::Gain> gains = search.gains({});
+  REQUIRE(gains[1].score > gains[0].score);  // with less than nothing of it
+  REQUIRE(gains[1].score < gains[0].score + SearchLimits{}.threshold);
+  CHECK(alike.found() == std::vector<int>{0});
+}
+
+TEST_CASE("what a form that no machine has explains far better is something else") {
+  CHECK(TwoForms(1.5).found().empty());
+}
