@@ -8109,7 +8109,7 @@ def dynamics_identify(robot: Robot, recordings: collections.abc.Sequence[Recordi
     
     Raises InputError on recordings or options that cannot be used.
     """
-def dynamics_plan(robot: Robot, options: TorquePlanOptions | None = None, recordings: collections.abc.Sequence[Recording] = []) -> TorquePlan:
+def dynamics_plan(robot: Robot, options: TorquePlanOptions | None = None, recordings: collections.abc.Sequence[Recording] = [], own_effects: collections.abc.Sequence[typing.Any] = []) -> TorquePlan:
     """
     A motion that tells effects on torques apart, within the joints' limits, and what it could show.
     

@@ -3,6 +3,7 @@
 #include "tables/dynamics/plan.hpp"
 #include "convert/columns.hpp"
 #include "convert/options.hpp"
+#include "convert/own_effects.hpp"
 #include "convert/text.hpp"
 #include "parts.hpp"
 #include "repr.hpp"
@@ -56,13 +57,15 @@ void bind_torque_plan(py::module_& m) {
   m.def(
       "dynamics_plan",
       [](const Robot& given_robot, const std::optional<TorquePlanOptions>& given,
-         const std::vector<Recording>& recordings) {
-        const TorquePlanOptions options = given.value_or(TorquePlanOptions{});
+         const std::vector<Recording>& recordings, const std::vector<py::object>& own) {
+        TorquePlanOptions options = given.value_or(TorquePlanOptions{});
+        options.own_effects = torque_effects_evaluated_when_asked(own);
         const Robot robot = given_robot;
         const py::gil_scoped_release unlocked;
         return dynamics::plan(robot, options, recordings);
       },
       py::arg("robot"), py::arg("options") = py::none(), py::arg("recordings") = std::vector<Recording>{},
+      py::arg("own_effects") = std::vector<py::object>{},
       R"(A motion that tells effects on torques apart, within the joints' limits, and what it could show.
 
 recordings: looked at as well, for what they can show. Raises InputError: options, names or recordings that cannot be

@@ -108,7 +108,11 @@ def effect_names() -> list[str]:
 
 @takes(_core.TorquePlanOptions)
 def plan(
-    robot: Robot, recordings: Sequence[Recording] = (), **options: Unpack[TorquePlanKeywords]
+    robot: Robot,
+    recordings: Sequence[Recording] = (),
+    *,
+    effects: TorqueEffect | Iterable[TorqueEffect] = (),
+    **options: Unpack[TorquePlanKeywords],
 ) -> TorquePlan:
     """A motion that tells effects on torques apart, within the joints' limits, and what it could show.
 
@@ -119,12 +123,13 @@ def plan(
 
     robot: with masses, centres of mass and inertias of its links. recordings: looked at as well, for what
     they can show; with torques or without.
+    effects: definitions of own effects that count beside the catalogue's; `separate` may name them.
     options: fields of `TorquePlanOptions`. `columns` and `separate` may be one text.
 
     Raises InputError: options, names or recordings that cannot be used, a joint without room to move.
     """
     chosen = made(_core.TorquePlanOptions, {**options, "separate": requests(options.get("separate", ()))})
-    return _core.dynamics_plan(robot, chosen, list(recordings))
+    return _core.dynamics_plan(robot, chosen, list(recordings), own_torque_effects(effects, robot))
 
 
 def with_payload(

@@ -7,7 +7,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truing.dynamics import MotionInputs, Recording, TorqueEffect, diagnose, identify, predict
+from truing.dynamics import (
+    MotionInputs,
+    Recording,
+    TorqueEffect,
+    TorqueEffectSize,
+    TorquePlan,
+    diagnose,
+    identify,
+    plan,
+    predict,
+)
 from truing.errors import InputError
 from truing.testing.dynamics import simulate_motion
 
@@ -89,3 +99,39 @@ def test_what_a_basis_may_not_do_is_said() -> None:
         diagnose(SIMULATED.nominal, RECORDINGS, effects=TorqueEffect("odd", "J9", lambda m: m.time))
     with pytest.raises(InputError, match="taken by the catalogue"):
         TorqueEffect("coulomb", "J3", lambda m: m.time)
+
+
+QUICK = {"duration": 12.0, "starts": 3, "rounds": 3, "seed": 5}
+
+
+def test_a_plan_says_from_which_size_on_it_would_show() -> None:
+    def hose(planned: TorquePlan) -> TorqueEffectSize:
+        (one,) = [e for e in planned.planned.effects if e.effect == "hose"]
+        return one
+
+    nominal = SIMULATED.nominal
+    one = hose(plan(nominal, effects=HOSE, **QUICK))
+    assert (tuple(one.joints), one.joint) == (("J3",), "J3")
+    assert (one.parameter, one.unit) == ("hose.J3", "Nm/rad^2")
+    assert 0.0 < one.size < STIFFNESS
+    thrice = TorqueEffect("hose", "J3", lambda m: 3.0 * bent(m.joint("J3")), unit="Nm/rad^2")
+    still = {**QUICK, "starts": 1, "rounds": 0}
+    assert 3.0 * hose(plan(nominal, effects=[thrice], **still)).size == pytest.approx(
+        hose(plan(nominal, effects=[HOSE], **still)).size, rel=0.02
+    )
+
+
+def test_a_motion_is_planned_that_tells_it_from_others() -> None:
+    planned = plan(SIMULATED.nominal, effects=HOSE, separate="hose:J3,spring:J3", **QUICK)
+    assert {(p.effect, p.other) for p in planned.separated} == {("hose", "spring"), ("spring", "hose")}
+    assert planned.information > planned.information_random
+    with pytest.raises(InputError, match="hose"):
+        plan(SIMULATED.nominal, separate="hose:J3,spring:J3", **QUICK)
+
+
+def test_a_plan_says_what_of_it_cannot_be_used() -> None:
+    warm = TorqueEffect("warm", "J3", lambda m: m.column("temp3_C"))
+    with pytest.raises(InputError, match="temp3_C"):
+        plan(SIMULATED.nominal, effects=warm, **QUICK)
+    with pytest.raises(InputError, match="TorqueEffect"):
+        plan(SIMULATED.nominal, effects="spring", **QUICK)  # type: ignore[arg-type]
