@@ -103,6 +103,7 @@ class Naming {
       }
     }
     if (mine.family == TorqueFamily::inertia) add_one_scale(&in_class, confounded);
+    add_as_likely(mine, &in_class, confounded);
     for (TorqueAlternative& alternative : *confounded) alternative.probability *= 1.0 / (in_class + outside);
     return in_class / (in_class + outside);
   }
@@ -131,6 +132,25 @@ class Naming {
       const double weight = std::exp(-kTempered * std::max(behind, 0.0));
       confounded->push_back({other.effect, other.joints, weight});
       *in_class += weight;
+    }
+  }
+
+  /// What the values that were found may as well be by the effect's own word (TorqueTerm::may_as_well_be).
+  void add_as_likely(const TorqueGroup& mine, double* in_class, std::vector<TorqueAlternative>* confounded) const {
+    std::map<std::string, double> values;
+    for (const int c : fit_.columns) values[design_.terms[static_cast<std::size_t>(c)].parameter] = value_of(c);
+    for (const int c : mine.columns) {
+      const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
+      const std::string other = term.may_as_well_be ? term.may_as_well_be(values) : "";
+      const bool known = std::any_of(confounded->begin(), confounded->end(), [&](const TorqueAlternative& one) {
+        return one.effect == other && one.joints == mine.joints;
+      });
+      const bool there = std::any_of(design_.groups.begin(), design_.groups.end(), [&](const TorqueGroup& group) {
+        return group.effect == other && group.joints == mine.joints;
+      });
+      if (!there || known) continue;
+      confounded->push_back({other, mine.joints, 1.0});
+      *in_class += 1.0;
     }
   }
 

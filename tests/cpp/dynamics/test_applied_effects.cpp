@@ -3,6 +3,7 @@
 
 // What a robot carries acts in every motion, also in one that could not have shown it.
 
+#include <algorithm>
 #include <cmath>
 
 #include <doctest/doctest.h>
@@ -51,6 +52,17 @@ TEST_CASE("effects that a robot carries have their terms whatever the motion") {
   CHECK(terms("stribeck", {{"", 1.0}, {".vs", 0.05}}).size() == 1);
   CHECK(terms("presliding", {{"", 1.0}, {".x0", 1e-3}}).size() == 1);
   CHECK(terms("ripple", {{".sin1", 0.1}, {".cos1", 0.2}}).size() == 2);
+}
+
+TEST_CASE("a Stribeck curve that falls nowhere beside the drag may as well be drag that is not linear") {
+  const TorqueTerm term = terms("stribeck", {{"", 1.0}, {".vs", 0.1}}).front();
+  const auto other = [&](double drag) { return term.may_as_well_be({{"stribeck.J1", 2.0}, {"viscous.J1", drag}}); };
+  double fall = 0.0;  // of 2 exp(-(v / 0.1)^2) at most, by differences
+  const auto curve = [](double v) { return 2.0 * std::exp(-v * v / 0.01); };
+  for (double v = 0.0; v < 0.5; v += 1e-4) fall = std::max(fall, (curve(v) - curve(v + 1e-4)) / 1e-4);
+  CHECK(other(1.001 * fall) == "viscous_law");
+  CHECK(other(0.99 * fall) == "");
+  CHECK(term.may_as_well_be({{"stribeck.J1", 2.0}}) == "");
 }
 
 TEST_CASE("what a model needs the torque for sees that of another where it was told so") {

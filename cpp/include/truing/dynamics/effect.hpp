@@ -71,6 +71,9 @@ struct TorqueTerm {
   /// Numbers that the basis was made with (a Stribeck speed): kept by full name among the parameters of
   /// Robot::torque_effects.
   std::map<std::string, double> constants{};
+  /// The effect at the same joint that it may as well be with these values of the joint's parameters, by full name;
+  /// empty: none. A diagnosis says it beside its own.
+  std::function<std::string(const std::map<std::string, double>&)> may_as_well_be{};
 };
 
 /// What kind of law an effect is: those of one kind trade places, and are told apart last.

@@ -88,12 +88,23 @@ TorqueForm viscous_law_with(const Robot& robot, std::size_t joint, const std::ma
 
 // --- Stribeck 1902: friction falls from stiction to Coulomb's as the joint gets faster
 
+/// Slope by which size * exp(-(v / vs)^2) falls where it does so fastest, at vs / sqrt(2).
+double steepest(double size, double vs) { return size * std::sqrt(2.0) * std::exp(-0.5) / vs; }
+
+// Where the linear drag grows by more than the curve falls, friction falls nowhere: a curve of drag that is not linear
+// may look the same.
 TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double prior) {
   TorqueTerm term = term_at(joint, parameter_name("stribeck", robot, joint), torque_unit(robot, joint), prior,
                             [joint, vs](const Motion& m) -> ArrayXd {
                               return direction(m, joint) * (-(speed(m, joint) / vs).square()).exp();
                             });
   term.constants[parameter_name("stribeck", robot, joint, "vs")] = vs;
+  term.may_as_well_be = [vs, own = term.parameter, drag = parameter_name("viscous", robot, joint)](
+                            const std::map<std::string, double>& values) -> std::string {
+    const auto at = values.find(drag);
+    const bool falls = at == values.end() || steepest(values.at(own), vs) > at->second;
+    return falls ? "" : kLaw;
+  };
   return {within(std::move(term), 0.0)};
 }
 
