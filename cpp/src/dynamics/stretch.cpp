@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
 constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
-constexpr double kFar = 0.024;            ///< [s] between rows: from here on differences say too little of a motion
+constexpr double kFarApart = 0.024;       ///< [s] between rows: from here on differences say too little of a motion
 constexpr double kBetween = 100.0;        ///< rows a second of the curve through such rows, at most
 constexpr double kMostOfRate = 0.25;      ///< cut-off to recorded rows a second: rows show nothing above a half
 constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
@@ -86,7 +86,7 @@ Stretch::Stretch(std::size_t joints, std::vector<std::string> columns, double st
   };
   cutoff_ = cutoff_of(options.cutoff, step);
   fine_ = every(kFinePerCutoff, options.cutoff, step);
-  between_ = step < kFar ? 1 : static_cast<Index>(kBetween * step + 1e-6);
+  between_ = step < kFarApart ? 1 : static_cast<Index>(kBetween * step + 1e-6);
   fine_step_ = step * static_cast<double>(fine_) / static_cast<double>(between_);
   const double seen_step = step * static_cast<double>(fine_);
   coarse_ = fine_ * every(kCoarsePerCutoff, cutoff_, seen_step);
@@ -97,7 +97,7 @@ Stretch::Stretch(std::size_t joints, std::vector<std::string> columns, double st
 }
 
 double Stretch::cutoff_of(double wanted, double step) {
-  return step < kFar ? wanted : std::min(wanted, kMostOfRate / step);
+  return step < kFarApart ? wanted : std::min(wanted, kMostOfRate / step);
 }
 
 void Stretch::add(const Recording& rows, Index begin, Index end, double start) {

@@ -16,11 +16,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kApart = 0.1;      ///< of the squares that one frame leaves, at most
-constexpr std::size_t kFewest = 8;  ///< rows of a part: a few that stand out are no frame of their own
+constexpr double kMostOfOneFrame = 0.1;     ///< of the squares that one frame leaves, at most
+constexpr std::size_t kFewestOfAFrame = 8;  ///< rows of a part: a few that stand out are no frame of their own
 
 /// Sums over rows that a frame is fitted by.
-struct Moments {
+struct FrameSums {
   double n = 0.0, squares = 0.0;
   Vector3d p = Vector3d::Zero(), m = Vector3d::Zero();
   Matrix3d products = Matrix3d::Zero();
@@ -32,8 +32,8 @@ struct Moments {
     m += measured;
     products += measured * predicted.transpose();
   }
-  Moments without(const Moments& others) const {
-    Moments out = *this;
+  FrameSums without(const FrameSums& others) const {
+    FrameSums out = *this;
     out.n -= others.n;
     out.squares -= others.squares;
     out.p -= others.p;
@@ -44,12 +44,12 @@ struct Moments {
 };
 
 /// The rigid motion that carries what is predicted to what was measured (Umeyama 1991, eq. 34 to 43).
-struct Motion {
+struct RigidFit {
   Matrix3d R;
   double left;  ///< [m^2] squares
 };
 
-Motion motion_of(const Moments& sums) {
+RigidFit rigid_fit_of(const FrameSums& sums) {
   const Matrix3d covariance = sums.products - sums.m * sums.p.transpose() / sums.n;
   const double spread = sums.squares - (sums.p.squaredNorm() + sums.m.squaredNorm()) / sums.n;
   const math::SingularValues svd = math::singular_values(covariance);
@@ -62,29 +62,29 @@ Motion motion_of(const Moments& sums) {
 
 std::optional<FrameChange> find_frame_change(const Positions& predicted, const Positions& measured,
                                              const std::vector<std::int32_t>& rows) {
-  if (rows.size() < 2 * kFewest) return {};
+  if (rows.size() < 2 * kFewestOfAFrame) return {};
   // Sums about a point amid them lose no digits to how far the instrument stands.
   const Vector3d at_p = predicted.row(rows.front()), at_m = measured.row(rows.front());
-  std::vector<Moments> before(rows.size() + 1);
+  std::vector<FrameSums> before(rows.size() + 1);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     before[k + 1] = before[k];
     before[k + 1].add(predicted.row(rows[k]).transpose() - at_p, measured.row(rows[k]).transpose() - at_m);
   }
-  const Moments& all = before.back();
-  const double together = motion_of(all).left;
-  double least = kApart * together;
+  const FrameSums& all = before.back();
+  const double together = rigid_fit_of(all).left;
+  double least = kMostOfOneFrame * together;
   std::size_t change = 0;
-  for (std::size_t k = kFewest; k + kFewest <= rows.size(); ++k) {
-    const double left = motion_of(before[k]).left + motion_of(all.without(before[k])).left;
+  for (std::size_t k = kFewestOfAFrame; k + kFewestOfAFrame <= rows.size(); ++k) {
+    const double left = rigid_fit_of(before[k]).left + rigid_fit_of(all.without(before[k])).left;
     if (left >= least) continue;
     least = left;
     change = k;
   }
   if (change == 0) return {};
-  const Moments first = before[change], second = all.without(first);
-  const Matrix3d R1 = motion_of(first).R, R2 = motion_of(second).R;
+  const FrameSums first = before[change], second = all.without(first);
+  const Matrix3d R1 = rigid_fit_of(first).R, R2 = rigid_fit_of(second).R;
   const Vector3d middle = all.p / all.n;
-  const auto carried = [&](const Moments& part, const Matrix3d& R) -> Vector3d {
+  const auto carried = [&](const FrameSums& part, const Matrix3d& R) -> Vector3d {
     return part.m / part.n + R * (middle - part.p / part.n);
   };
   FrameChange out;
