@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Standard errors of real robots' parameters against what half-samples scatter by.
+
+    python bench/half_samples.py [--data FOLDER] [--splits 8] [--seed 5]
+
+The poses of each recording are parted in two halves at random, repeats of a pose together, and `identify`
+is run on either. Two fits to different poses differ by sqrt(s1^2 + s2^2) where their standard errors s1, s2
+are right. Printed are the rms of these ratios over all parameters and splits, and their median over that of
+a normal number, which a few parameters that are hardly seen do not move. 1: the errors are the scatter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from real_diagnosis import ARMS, RECORDINGS, default_folder, fit, load, parted
+
+import truing
+from truing.identification import Identification
+
+NORMAL = 0.6745  # median of the size of a normal number
+
+
+def poses_of(data: truing.Measurements) -> Any:
+    """Rows at the same joints share a number. shape=(n,)"""
+    return np.unique(np.round(np.asarray(data.joints), 9), axis=0, return_inverse=True)[1].ravel()
+
+
+def seen(found: Identification) -> list[Any]:
+    return [p for p in found.parameters if not p.frozen and p.sigma > 0.0]
+
+
+def ratios(robot: truing.Robot, data: truing.Measurements, splits: int, seed: int) -> NDArray[np.float64]:
+    """Differences of two halves' parameters over the standard errors of these."""
+    group, out = poses_of(data), []
+    for number in range(splits):
+        one = parted(group, len(group) // 2, number, seed)
+        halves = [{p.name: p for p in seen(fit(robot, data.replace(set=half)))} for half in (one, 1 - one)]
+        for name in halves[0].keys() & halves[1].keys():
+            a, b = halves[0][name], halves[1][name]
+            out.append((a.value - b.value) / np.hypot(a.sigma, b.sigma))
+    return np.array(out)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=default_folder())
+    parser.add_argument("--splits", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=5)
+    arguments = parser.parse_args()
+    print("| set | poses | rms | by the median |\n| --- | --- | --- | --- |")
+    for recording in (*RECORDINGS, *ARMS):
+        if not (arguments.data / recording.folder).is_dir():
+            print(f"{recording.name}: not there", file=sys.stderr)
+            continue
+        robot, data = load(arguments.data, recording)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of columns that every fit would say again
+            found = ratios(robot, data, arguments.splits, arguments.seed)
+        poses = len(np.unique(poses_of(data)))
+        rms, median = np.sqrt(np.mean(found**2)), np.median(np.abs(found)) / NORMAL
+        print(f"| {recording.name} | {poses} | {rms:.2f} | {median:.2f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
