@@ -18,7 +18,6 @@ namespace truing::diagnosis {
 using Kind = Explanation::Kind;
 constexpr int kNullDraws = 200;
 constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validated sum of squares by more than this
-constexpr double kManyValues = 10.0;  ///< for each parameter of the links: no longer few
 constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
 constexpr double kNoChance = 1.5;     ///< sums of squares that noise alone does not make so unequal
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
@@ -182,6 +181,19 @@ Evidence evidence_now(const Work& work) {
   return Evidence(work.grams.train, work.design.candidates.groups, work.design.nuisance, work.design.prior);
 }
 
+int all_links(const Work& work) {
+  const auto& named = work.design.candidates.named;
+  const auto at =
+      std::find_if(named.begin(), named.end(), [](const Explanation& e) { return e.kind == Kind::all_geometry; });
+  return at == named.end() ? -1 : static_cast<int>(at - named.begin());
+}
+
+bool has_few_poses(const Work& work, int links) {
+  constexpr double kManyValues = 10.0;  // for each parameter of the links
+  const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(links)].columns;
+  return work.grams.train.n <= kManyValues * static_cast<double>(columns.size());
+}
+
 /// Angles of links are as large in milliradians as lengths are in millimetres where a robot reaches a metre; a
 /// table-top arm's are larger, since what is machined to a hundredth is short. The ratio is the data's own: that of the
 /// highest evidence of all links together (MacKay 1992, alternative priors), where it is clear. Many poses need no
@@ -189,12 +201,9 @@ Evidence evidence_now(const Work& work) {
 void size_angles_of_links(Work* work) {
   constexpr double kRatios[] = {1.0 / 3.0, 3.0, 10.0};
   constexpr double kClear = 2.0;  // nats
-  const auto& named = work->design.candidates.named;
-  const auto at =
-      std::find_if(named.begin(), named.end(), [](const Explanation& e) { return e.kind == Kind::all_geometry; });
-  if (at == named.end()) return;
-  const ColumnGroup& links = work->design.candidates.groups[static_cast<std::size_t>(at - named.begin())];
-  if (work->grams.train.n > kManyValues * static_cast<double>(links.columns.size())) return;
+  const int which = all_links(*work);
+  if (which < 0 || !has_few_poses(*work, which)) return;
+  const ColumnGroup& links = work->design.candidates.groups[static_cast<std::size_t>(which)];
   const auto with_ratio = [&](double ratio) {
     Eigen::VectorXd prior = work->design.prior;
     for (const int column : links.columns) {
@@ -609,14 +618,8 @@ static bool names_predict_better(const Work& work, const Decision& decision, con
 /// Few poses cannot say which link it is, nor which of many causes that would do as well. What is known of every robot
 /// beforehand, that its links are not as drawn, is believed before names that do not predict other poses better.
 static void prefer_links_that_predict(const Work& work, Decision* out) {
-  const auto& named = work.design.candidates.named;
-  const auto at =
-      std::find_if(named.begin(), named.end(), [](const Explanation& e) { return e.kind == Kind::all_geometry; });
-  if (at == named.end()) return;
-  const int links = static_cast<int>(at - named.begin());
-  const auto columns =
-      static_cast<double>(work.design.candidates.groups[static_cast<std::size_t>(links)].columns.size());
-  if (work.grams.train.n > kManyValues * columns) return;  // then the evidence decides
+  const int links = all_links(work);
+  if (links < 0 || !has_few_poses(work, links)) return;  // of many, the evidence decides
   const auto has_links = [&](const Choice& choice) {
     return std::find(choice.groups.begin(), choice.groups.end(), links) != choice.groups.end();
   };

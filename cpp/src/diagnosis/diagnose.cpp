@@ -235,6 +235,17 @@ bool keep_what_is_confirmed(const Work& work, const Evidence& evidence, Decision
   }
 }
 
+/// Some of the groups of a choice.
+Choice only_these(const Choice& choice, const std::vector<int>& groups) {
+  Choice out;
+  for (std::size_t k = 0; k < choice.groups.size(); ++k) {
+    if (std::find(groups.begin(), groups.end(), choice.groups[k]) == groups.end()) continue;
+    out.groups.push_back(choice.groups[k]);
+    out.scales.push_back(choice.scales[k]);
+  }
+  return out;
+}
+
 /// What a robot file can hold.
 bool is_in_catalogue(const Explanation& e) { return e.kind == Kind::catalogue || e.kind == Kind::all_geometry; }
 
@@ -264,6 +275,7 @@ struct Fitted {
   Refit by_catalogue, by_named, by_all;
   Residuals after_all;
   HeldOutFall by_robot;  ///< by `by_catalogue` alone
+  double part = 1.0;     ///< of what was found in `by_catalogue`; the rest is all links alone
 };
 
 Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs,
@@ -279,8 +291,14 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
     return refit(whole, work, inputs, robot, decision.state, groups);
   };
   Fitted fitted;
-  fitted.by_catalogue = refitted(catalogue_groups);
-  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refitted(named_groups) : fitted.by_catalogue;
+  const Refit by_names = refitted(catalogue_groups);
+  fitted.by_catalogue = by_names;
+  if (!every_group.empty() || whole.beyond_repeats > kLackOfFit)
+    fitted.part = average_with_links(whole, work, robot, only_these(decision.state.choice, catalogue_groups),
+                                     &fitted.by_catalogue.found);
+  fitted.by_named = named_groups.size() > catalogue_groups.size() ? refitted(named_groups)
+                    : named_groups.empty()                        ? by_names
+                                                                  : fitted.by_catalogue;
   fitted.by_all = every_group.size() > named_groups.size() ? refitted(every_group) : fitted.by_named;
 
   const auto left_by = [&](const Robot& of, const std::vector<Effect>& own) {
@@ -303,12 +321,25 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   };
   if (!every_group.empty())
     out->held_out_fall = fall_to(named_groups.empty() ? lengths(fitted.after_all) : out->error_after);
-  if (catalogue_groups.empty()) return fitted;
+  if (catalogue_groups.empty() && fitted.part == 1.0) return fitted;
   const std::vector<double> by_robot = lengths(left_by(out->robot, whole.options.own_effects));
   fitted.by_robot = fall_to(by_robot);
   out->shrink =
       percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - judged(by_robot).rms / out->gap.rms : 0.0);
   return fitted;
+}
+
+/// What is in the robot file beside what was named.
+void say_what_was_averaged(double part, Diagnosis* out) {
+  if (part == 1.0) return;
+  const auto percent = [](double of) { return number(100.0 * of, 2) + " %"; };
+  out->warnings.push_back(
+      out->effects.empty()
+          ? "these poses are few: though no cause is named, the robot file has " + percent(1.0 - part) +
+                " of all wrong links, under a wide prior; training poses are predicted best so"
+          : "these poses are few: the robot file, and the values of what is named, are an average, " + percent(part) +
+                " of what was found and " + percent(1.0 - part) +
+                " of wrong links alone, under a wide prior; training poses are predicted best so");
 }
 
 /// Noise from repeats where there are enough, else what the chosen model leaves; and how much of the gap beyond it is
@@ -428,6 +459,17 @@ Verdict verdict_of(const Diagnosis& d) {
   return d.unknown.empty() ? Verdict::effects : Verdict::effects_and_unknown;
 }
 
+/// What is in the robot file: what was found, or frames alone, for no robot is worse than nothing.
+void decide_on_robot(const Robot& frames_alone, const Fitted& fitted, Diagnosis* out) {
+  const bool worse = fitted.by_robot.probability < kContradicted || is_far_worse(1.0, 1.0 - out->shrink.value);
+  if (out->verdict != Verdict::does_not_hold && !worse) {
+    say_what_was_averaged(fitted.part, out);
+    return;
+  }
+  out->robot = frames_alone;
+  out->shrink = {};
+}
+
 std::vector<std::vector<double>> copied(const std::vector<Column>& columns, std::size_t rows) {
   std::vector<std::vector<double>> out;
   for (const Column& column : columns) {
@@ -514,13 +556,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   }
   share_the_gap(&result);
   result.verdict = verdict_of(result);
-  const bool robot_is_worse =
-      fitted.by_robot.probability < kContradicted || is_far_worse(1.0, 1.0 - result.shrink.value);
-  const bool contradicted = result.verdict == Verdict::does_not_hold || robot_is_worse;
-  if (contradicted) {  // no robot worse than nothing
-    result.robot = whole.frames.robot;
-    result.shrink = {};
-  }
+  decide_on_robot(whole.frames.robot, fitted, &result);
   result.candidates = list_candidates(work, evidence, decision.first);
   result.detectable = smallest_sizes(work, evidence, decision);
   share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, &result);

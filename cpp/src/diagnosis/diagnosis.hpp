@@ -149,6 +149,9 @@ Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice);
 /// (Varma and Simon 2006). A quarter of the folds at a time; `choose`: from the sums of the other folds.
 Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(const Gram&)>& choose);
 double cross_validated(const Work& work, const Choice& choice);
+/// Part of one choice's fit in the average with another's that misses training folds least, each predicted from the
+/// others: stacked regressions (Breiman 1996) of two fits whose parts are not negative and add up to one.
+double stacked_part(const Work& work, const Choice& one, const Choice& other);
 /// Does one choice predict the folds better than another, by this factor and for sure?
 bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);
 /// Of every training fold by a fit to the others, and of the poses held out by the fit to all training folds.
@@ -208,6 +211,10 @@ int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const s
 /// Groups that do not help, for sure, on poses they were not fitted to go, however well they fit.
 Evidence::State keep_what_predicts(const Work& work, Evidence::State state);
 
+/// The group of all links together; -1: the robot has none.
+int all_links(const Work& work);
+/// Fewer than ten values for each parameter of the links: what is known of every robot beforehand counts.
+bool has_few_poses(const Work& work, int links);
 /// How large angles of links are against their lengths, as the data have it.
 void size_angles_of_links(Work* work);
 Decision decide(Work* work, const Robot& robot);
@@ -294,12 +301,28 @@ double calibrated(double posterior, double selection_frequency, double gain);
 // --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
 
 Share percentile_interval(std::vector<double> values, double center);
+/// What `identify` is asked for.
+struct RefitTask {
+  Robot start;
+  IdentifyOptions options;
+};
+
+/// Of the chosen `groups`, whose parameters have the size of their group. `inputs` are those of the whole.
+RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
+                     const Evidence::State& state, const std::vector<int>& groups);
 /// The chosen `groups` fitted without linearisation on the training rows of `whole`, under the search's priors.
 /// `inputs` are those of the whole.
 Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups);
 double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,
                    const Repeats& repeats);
+
+// --- average.cpp: of few poses, two fits in one ----------------------------------------------------------------------
+
+/// Of few poses: `found`, the fit of a choice, averaged with one of all links alone under the widest prior, as poses
+/// that neither saw have it. The part that is left of the choice's fit; 1: nothing was averaged.
+double average_with_links(const Registered& whole, const Work& work, const Robot& robot, const Choice& choice,
+                          Identification* found);
 
 // --- describe.cpp: what the user reads -------------------------------------------------------------------------------
 

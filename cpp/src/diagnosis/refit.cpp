@@ -42,12 +42,6 @@ static Eigen::VectorXd solutions_of(const Evidence::State& state, const std::vec
   return out;
 }
 
-/// What `identify` is asked for.
-struct RefitTask {
-  Robot start;
-  IdentifyOptions options;
-};
-
 /// Parameters of the model that `identify` will have for the explanation: at the nominal robot, whose lengths may be
 /// none where the search's are not.
 static std::set<std::string> parameters_at(const Robot& robot, const Explanation& e, const Registered& given) {
@@ -103,8 +97,8 @@ static std::vector<std::string> other_forms(const Design& design, const Evidence
   return out;
 }
 
-static RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
-                            const Evidence::State& state, const std::vector<int>& groups) {
+RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
+                     const Evidence::State& state, const std::vector<int>& groups) {
   const Design& design = work.design;
   const DiagnoseOptions& options = work.given.options;
   RefitTask out;

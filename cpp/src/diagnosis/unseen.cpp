@@ -78,6 +78,25 @@ Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(co
   return out;
 }
 
+double stacked_part(const Work& work, const Choice& one, const Choice& other) {
+  const Fits a = fits_of(work, one), b = fits_of(work, other);
+  std::vector<int> columns = a.columns;
+  columns.insert(columns.end(), b.columns.begin(), b.columns.end());  // some of them twice, and each time a part
+  const auto squares = [&](double part) {
+    double out = 0.0;
+    for (std::size_t fold = 0; fold < a.without.size(); ++fold) {
+      Eigen::VectorXd average(static_cast<Eigen::Index>(columns.size()));
+      average << part * a.without[fold], (1.0 - part) * b.without[fold];
+      out += held_out_squares(work.grams.train_folds[fold], columns, average);
+    }
+    return out;
+  };
+  // They are a parabola of the part.
+  const double none = squares(0.0), half = squares(0.5), whole = squares(1.0);
+  const double bend = none + whole - 2.0 * half;
+  return bend > 0.0 ? std::clamp((3.0 * none + whole - 4.0 * half) / (4.0 * bend), 0.0, 1.0) : 1.0;
+}
+
 double cross_validated(const Work& work, const Choice& choice) { return squares_of_folds(work, choice).sum(); }
 
 /// Standard errors by which the folds' sums of squares rise from one choice to another; of their roots, or a single

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "diagnosis/diagnosis.hpp"
+#include "math/random.hpp"
 
 using truing::Diagnosis;
 using truing::FoundEffect;
@@ -46,6 +47,51 @@ TEST_CASE("rows of one held-out pose count as one, and rows that were learned fr
   const HeldOutFall fall = fall_of({1e-3, 1e-3, 2e-3, 9.0}, {0.0, 0.0, 1e-3, 0.0}, {1, 1, 1, 0}, {0, 0, 1, 2});
   CHECK(fall.poses == 2);
   CHECK(fall.mean == doctest::Approx(1e-3));
+}
+
+namespace {
+
+/// Two candidates of one column each, on folds of 20 rows: the first makes y but for noise, the second is chance.
+truing::diagnosis::Work two_candidates(double noise) {
+  using truing::diagnosis::Work;
+  Work work;
+  work.design.x = Eigen::MatrixXd::Zero(120, 3);
+  work.design.y = Eigen::VectorXd::Zero(120);
+  work.design.weight = Eigen::VectorXd::Ones(120);
+  work.design.prior = Eigen::VectorXd::Ones(3);
+  work.design.folds = 6;
+  work.design.nuisance = {0};
+  truing::math::Random random(5);
+  for (Eigen::Index i = 0; i < 120; ++i) {
+    work.design.x.row(i) << 1.0, random.normal(), random.normal();
+    work.design.y[i] = 0.3 + work.design.x(i, 1) + noise * random.normal();
+    work.design.fold.push_back(static_cast<std::int32_t>(i % 6));
+  }
+  for (const int column : {1, 2}) {
+    truing::estimation::ColumnGroup group;
+    group.columns = {column};
+    work.design.candidates.groups.push_back(group);
+  }
+  work.design.candidates.named.resize(2);
+  work.grams = truing::diagnosis::make_grams(work.design, 1.0, 1);
+  return work;
+}
+
+}  // namespace
+
+TEST_CASE("the part of a fit in an average is that which poses it did not see have of it") {
+  using truing::diagnosis::stacked_part;
+  using truing::estimation::Choice;
+  const truing::diagnosis::Work work = two_candidates(0.5);
+  const Choice first = {{0}, {1.0}}, held = {{0}, {0.05}}, nothing = {};
+  CHECK(stacked_part(work, first, nothing) > 0.95);
+  CHECK(stacked_part(work, nothing, first) < 0.05);
+  CHECK(stacked_part(work, first, first) == 1.0);
+  // A choice and its complement share an average.
+  const double part = stacked_part(work, held, {{0, 1}, {1.0, 1.0}});
+  CHECK(part > 0.0);
+  CHECK(part < 1.0);
+  CHECK(stacked_part(work, {{0, 1}, {1.0, 1.0}}, held) == doctest::Approx(1.0 - part));
 }
 
 TEST_CASE("the sentence says how sure held-out poses are") {

@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Of few poses: the robot found, averaged with wrong links alone.
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/diagnosis.hpp"
+#include "model/model.hpp"
+
+namespace truing::diagnosis {
+namespace {
+
+/// From one frame (0) to another (1).
+Eigen::Isometry3d frame_between(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double part) {
+  Eigen::Isometry3d out;
+  out.translation() = (1.0 - part) * from.translation() + part * to.translation();
+  out.linear() =
+      Eigen::Quaterniond(from.linear()).slerp(part, Eigen::Quaterniond(to.linear())).normalized().toRotationMatrix();
+  return out;
+}
+
+/// From one robot (0) to another (1), that may have effects which the first has not: every value moves on a straight
+/// line, as its motion of the tip does where errors are small.
+Robot robot_between(const Robot& from, const Robot& to, const Registered& given, double part) {
+  const auto model_of = [&](const Robot& robot) {
+    return model::make_model(robot, given.data, {}, given.options.own_effects);
+  };
+  const model::Model start = model_of(from), end = model_of(to);
+  const Eigen::VectorXd at_start = model::initial_values(start), at_end = model::initial_values(end);
+  Eigen::VectorXd values = part * at_end;
+  for (std::size_t k = 0; k < end.parameters.size(); ++k) {
+    const int same = start.parameter_index(end.parameters[k].name);
+    if (same >= 0) values[static_cast<Eigen::Index>(k)] += (1.0 - part) * at_start[same];
+  }
+  Robot out = model::robot_with(end, values);
+  out.T_measurement_base = frame_between(from.T_measurement_base, to.T_measurement_base, part);
+  for (std::size_t k = 0; k < out.targets.size(); ++k)
+    out.targets[k].T_last_target = frame_between(from.targets[k].T_last_target, to.targets[k].T_last_target, part);
+  for (std::size_t k = 0; k < out.joints.size() && out.convention == Convention::urdf; ++k)
+    out.joints[k].T_parent_joint = frame_between(from.joints[k].T_parent_joint, to.joints[k].T_parent_joint, part);
+  return out;
+}
+
+const Parameter* parameter_named(const std::string& name, const std::vector<Parameter>& parameters) {
+  const auto at =
+      std::find_if(parameters.begin(), parameters.end(), [&](const Parameter& p) { return p.name == name; });
+  return at == parameters.end() ? nullptr : &*at;
+}
+
+double value_of(const std::string& name, const std::vector<Parameter>& parameters, double otherwise) {
+  const Parameter* found = parameter_named(name, parameters);
+  return found ? found->value : otherwise;
+}
+
+/// What few poses hardly show is a valley that is straight only where values are small: half way between two of its
+/// points lies beside its floor. So the average is fitted once more, base and targets freely, values of links within a
+/// tenth of what lies between the two fits.
+Identification back_to_the_floor(const Registered& whole, const Robot& average, const RefitTask& of_links,
+                                 const Identification& links, const Identification& found) {
+  constexpr double kWithin = 0.1;
+  constexpr double kHeld = 1e-9;
+  Measurements data = whole.data;
+  data.set = whole.set;
+  IdentifyOptions options = of_links.options;
+  for (auto& [name, size] : options.priors) {
+    const Parameter* p = parameter_named(name, links.parameters);
+    if (p) size = std::max(kWithin * std::abs(p->value - value_of(name, found.parameters, p->nominal)), kHeld);
+  }
+  return identify(average, data, options);
+}
+
+}  // namespace
+
+double average_with_links(const Registered& whole, const Work& work, const Robot& robot, const Choice& choice,
+                          Identification* found) {
+  const int links = all_links(work);
+  if (links < 0 || !has_few_poses(work, links)) return 1.0;
+  const Choice wide = {{links}, {1.0}};  // as far off as robots get
+  const double part = stacked_part(work, choice, wide);
+  if (part == 1.0) return 1.0;
+  Measurements data = whole.data;
+  data.set = whole.set;
+  const RefitTask task = refit_task(work, work.inputs, robot, evidence_now(work).evaluate(wide), wide.groups);
+  const Identification other = identify(task.start, data, task.options);
+  const Identification settled =
+      back_to_the_floor(whole, robot_between(other.robot, found->robot, whole, part), task, other, *found);
+  found->robot = settled.robot;
+  for (Parameter& p : found->parameters) {
+    p.value = part * p.value + (1.0 - part) * value_of(p.name, other.parameters, p.nominal);
+    if (const Parameter* moved = parameter_named(p.name, settled.parameters)) p.value += moved->value - moved->nominal;
+  }
+  return part;
+}
+
+}  // namespace truing::diagnosis
