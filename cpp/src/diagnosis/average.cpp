@@ -78,7 +78,8 @@ double average_with_links(const Registered& whole, const Work& work, const Robot
   const int links = all_links(work);
   if (links < 0 || !has_few_poses(work, links)) return 1.0;
   const Choice wide = {{links}, {1.0}};  // as far off as robots get
-  const double part = stacked_part(work, choice, wide);
+  // Links that no search found, beside nothing that a robot file can hold, count for half at most.
+  const double part = std::max(stacked_part(work, choice, wide), choice.groups.empty() ? 0.5 : 0.0);
   if (part == 1.0) return 1.0;
   Measurements data = whole.data;
   data.set = whole.set;
