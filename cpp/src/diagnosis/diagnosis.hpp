@@ -151,6 +151,7 @@ Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(co
 double cross_validated(const Work& work, const Choice& choice);
 /// Part of one choice's fit in the average with another's that misses training folds least, each predicted from the
 /// others: stacked regressions (Breiman 1996) of two fits whose parts are not negative and add up to one.
+/// Where both predict the same: all of the one.
 double stacked_part(const Work& work, const Choice& one, const Choice& other);
 /// Does one choice predict the folds better than another, by this factor and for sure?
 bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);

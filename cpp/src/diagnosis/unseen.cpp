@@ -79,6 +79,7 @@ Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(co
 }
 
 double stacked_part(const Work& work, const Choice& one, const Choice& other) {
+  constexpr double kAlike = 1e-4;  // of the squares: the fits predict the same
   const Fits a = fits_of(work, one), b = fits_of(work, other);
   std::vector<int> columns = a.columns;
   columns.insert(columns.end(), b.columns.begin(), b.columns.end());  // some of them twice, and each time a part
@@ -94,7 +95,8 @@ double stacked_part(const Work& work, const Choice& one, const Choice& other) {
   // They are a parabola of the part.
   const double none = squares(0.0), half = squares(0.5), whole = squares(1.0);
   const double bend = none + whole - 2.0 * half;
-  return bend > 0.0 ? std::clamp((3.0 * none + whole - 4.0 * half) / (4.0 * bend), 0.0, 1.0) : 1.0;
+  if (bend <= kAlike * whole) return 1.0;
+  return std::clamp((3.0 * none + whole - 4.0 * half) / (4.0 * bend), 0.0, 1.0);
 }
 
 double cross_validated(const Work& work, const Choice& choice) { return squares_of_folds(work, choice).sum(); }

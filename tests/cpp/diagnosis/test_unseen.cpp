@@ -86,7 +86,12 @@ TEST_CASE("the part of a fit in an average is that which poses it did not see ha
   const Choice first = {{0}, {1.0}}, held = {{0}, {0.05}}, nothing = {};
   CHECK(stacked_part(work, first, nothing) > 0.95);
   CHECK(stacked_part(work, nothing, first) < 0.05);
-  CHECK(stacked_part(work, first, first) == 1.0);
+  // Where both predict the same, whatever rounding leaves between them.
+  for (const double noise : {0.1, 0.3, 0.5, 1.0}) {
+    const truing::diagnosis::Work other = two_candidates(noise);
+    CHECK(stacked_part(other, first, first) == 1.0);
+    CHECK(stacked_part(other, {{0, 1}, {1.0, 0.1}}, {{1, 0}, {0.1, 1.0}}) == 1.0);
+  }
   // A choice and its complement share an average.
   const double part = stacked_part(work, held, {{0, 1}, {1.0, 1.0}});
   CHECK(part > 0.0);
