@@ -241,20 +241,3 @@ def test_the_table_of_torque_effects_is_the_one_that_they_tell() -> None:
     assert table == markdown_table(), (
         "put what truing.dynamics.api.markdown_table() returns between the marks"
     )
-
-
-@pytest.mark.parametrize("falls", [False, True])
-def test_a_curve_that_falls_nowhere_may_as_well_be_drag(falls: bool) -> None:
-    """Drag that begins at a speed makes a curve that never falls; stiction makes one that does."""
-    made = simulate_motion(hidden={}, seed=1)
-    recordings = []
-    for one in made.recordings:
-        speed = np.gradient(np.asarray(one.position)[:, 3], 0.01)
-        size = np.exp(-((speed / 0.08) ** 2)) if falls else np.maximum(np.abs(speed) - 0.25, 0.0)
-        torque = np.array(one.torque)
-        torque[:, 3] += 4.0 * np.sign(speed) * size
-        recordings.append(one.replace(torque=torque))
-    (effect,) = [e for e in diagnose(made.nominal, recordings).effects if not e.standard]
-    assert (effect.effect, tuple(effect.joints)) == ("stribeck", ("J4",))
-    others = [(c.effect, tuple(c.joints)) for c in effect.confounded_with]
-    assert (("viscous_law", ("J4",)) in others) != falls

@@ -66,7 +66,7 @@ def test_rows_with_the_brakes_on_are_left_out_and_no_others() -> None:
     assert said.value == pytest.approx(4 * STOPS * (BRAKED + 0.2), rel=0.1)
     for rows, one in zip(braked, found.recordings, strict=True):
         left = np.isin(STEP * np.arange(len(rows)), np.asarray(one.time))
-        assert left[~rows].mean() > 0.9
+        assert left[~rows].mean() > 0.85
         assert left[rows].mean() < 0.1
 
 
@@ -78,12 +78,16 @@ def test_of_arms_that_drives_hold_nothing_is_said(let_go: float | None) -> None:
 
 
 def test_what_is_found_is_what_is_found_without_brakes() -> None:
-    """With them, two loads at the tool were named before anything else."""
+    """With these rows 3.6 kg came and went, and held-out torques were off by more than they vary."""
     names = []
     for brakes in (False, True):
         recordings = [recorded(seed, brakes)[0].replace(test=seed >= 3) for seed in range(5)]
         found = check_recordings(ARM, recordings)
-        names.append([(one.effect, one.joints) for one in diagnose(found.robot, found.recordings).effects])
+        assert not {one.finding for one in found.findings} & {"load_comes_and_goes", "load_differs"}
+        diagnosed = diagnose(found.robot, found.recordings)
+        names.append([(one.effect, one.joints) for one in diagnosed.effects])
+        (named,) = [model for model in diagnosed.errors if model.model == "named"]
+        assert max(joint.percent for joint in named.held_out) < 3.0
     without, with_them = names
     assert with_them[0] == without[0]
     assert {one for one, _ in with_them} <= {one for one, _ in without}

@@ -199,6 +199,24 @@ def test_what_is_corrected_is_corrected_in_all_pieces(
         assert np.abs(whole["torque"]).max() < 1.5 * np.abs(one.torque).max()
 
 
+def test_rows_with_the_drives_off_are_left_out_of_all_pieces(
+    tmp_path: Path, simulated: SimulatedMotion
+) -> None:
+    """One piece is off as a whole, and the last one is a single row."""
+    rows = 6 * ROWS + 1
+    columns = {name: values[:rows] for name, values in columns_of(simulated.recordings[0]).items()}
+    number = np.arange(rows)
+    columns["enabled"] = np.where((number > 10) & ((number < 2 * ROWS) | (number >= 4 * ROWS)), 1.0, 0.0)
+    (found,) = load_recordings(written(tmp_path / "long.parquet", columns), simulated.nominal)
+    checked = check_recordings(simulated.nominal, [found])
+    (said,) = [one for one in checked.findings if one.finding == "drives_off"]
+    assert said.applied and "by the column enabled" in said.evidence
+    pieces = checked.recordings[0].pieces
+    assert pieces is not None
+    time = np.concatenate([np.asarray(piece.time) for piece in pieces()])
+    assert np.array_equal(time, columns["t_s"][columns["enabled"] > 0.5])
+
+
 def test_commands_longer_than_memory_are_refused_and_not_cut_short(
     tmp_path: Path, simulated: SimulatedMotion
 ) -> None:

@@ -37,30 +37,30 @@ def without_drives_off(
     usual = np.quantile(sizes, USUAL, axis=0)
     out, where, seconds, told = [], [], 0.0, False
     for recording in recordings:
-        off = drives_off(robot, usual, recording)
+        step = usual_step(np.asarray(recording.time))
+        off = drives_off(robot, usual, step, recording)
         if off.all():
             return [_always(recording)], list(recordings)
         if off.any():
             where.append(recording.name)
-            seconds += float(off.sum()) * usual_step(np.asarray(recording.time))
-            told = told or "enabled" in recording.columns
+            seconds += float(off.sum()) * step
+            told = told or bool(_told(recording).any())
         if off.any() or (recording.pieces is not None and "enabled" in recording.columns):
-            recording = of_all_rows(recording, partial(_with_drives_on, robot, usual))
+            recording = of_all_rows(recording, partial(_with_drives_on, robot, usual, step))
         out.append(recording)
     return ([_said(where, seconds, told)] if where else []), out
 
 
-def drives_off(robot: _core.Robot, usual: Floats, recording: _core.Recording) -> Bools:
-    """usual: shape=(joints,) [Nm | N] size of each joint's torque. shape=(n,)"""
-    time = np.asarray(recording.time)
-    enabled = recording.columns.get("enabled")
-    told = np.zeros(len(time), dtype=np.bool_) if enabled is None else np.asarray(enabled) < OFF
-    step = usual_step(time)
+def drives_off(robot: _core.Robot, usual: Floats, step: float, recording: _core.Recording) -> Bools:
+    """Rows of a recording, or of a piece of one, in which its drives are off. shape=(n,)
+
+    usual: shape=(joints,) [Nm | N] size of each joint's torque; step: [s] between rows.
+    """
     torque = np.nan_to_num(measured_torque(robot, recording))  # where there is none, none is asked for
     size = np.abs(torque) / np.where(usual > 0.0, usual, np.inf)
     resting = at_rest(np.asarray(recording.position), step)
     nothing = np.all(size < NOTHING, axis=1)
-    out = told.copy()
+    out = _told(recording)
     for first, last in _runs(resting):
         for begin, end in _runs(nothing[first:last]) + first:
             before = size[max(first, begin - round(BESIDE / step)) : begin]
@@ -69,6 +69,12 @@ def drives_off(robot: _core.Robot, usual: Floats, recording: _core.Recording) ->
                 margin = round(MARGIN / step)
                 out[max(0, begin - margin) : end + margin] = True
     return out
+
+
+def _told(recording: _core.Recording) -> Bools:
+    """Rows in which the drives are off by the column `enabled`. shape=(n,)"""
+    enabled = recording.columns.get("enabled")
+    return np.zeros(len(recording), dtype=np.bool_) if enabled is None else np.asarray(enabled) < OFF
 
 
 def _runs(wanted: Bools) -> NDArray[np.intp]:
@@ -91,8 +97,10 @@ def at_rest(q: Floats, step: float) -> Bools:
     return np.pad(moved < SPEED_AT_REST, half, mode="edge")
 
 
-def _with_drives_on(robot: _core.Robot, usual: Floats, recording: _core.Recording) -> _core.Recording:
-    return with_rows(recording, ~drives_off(robot, usual, recording))
+def _with_drives_on(
+    robot: _core.Robot, usual: Floats, step: float, recording: _core.Recording
+) -> _core.Recording:
+    return with_rows(recording, ~drives_off(robot, usual, step, recording))
 
 
 def _said(where: Sequence[str], seconds: float, told: bool) -> RecordingFinding:
