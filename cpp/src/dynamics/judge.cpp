@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "math/text.hpp"
@@ -84,6 +85,51 @@ Cells cells_of(const Problem& problem, const TorqueModel& standard, const Torque
   return out;
 }
 
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kBusy = 0.9;  ///< of the most moving rows that any stretch has: the first such is looked at
+
+/// A stretch of held-out rows.
+struct Moved {
+  std::size_t recording = 0;
+  double begin = kNever;  ///< [s]
+  VectorXd rows;          ///< shape=(joints,) in how many a joint moves
+};
+
+/// Stretches of so many seconds, from the first motion of each held-out recording on.
+std::vector<Moved> moving_rows(const Problem& problem, double seconds) {
+  std::vector<const Tile*> lot(Tiles::kTogether);
+  std::map<std::pair<std::size_t, Index>, Moved> stretches;
+  std::map<std::size_t, double> begins;
+  const auto count = [&](const Tile& tile) {
+    const VectorXd time = tile.own_time();
+    for (Index i = 0; i < tile.count; ++i) {
+      if (problem.test.fold(tile.recording, time[i]) < 0) continue;
+      if (!begins.count(tile.recording) && !(tile.moving.row(i).maxCoeff() > 0.0)) continue;
+      const double begin = begins.try_emplace(tile.recording, time[i]).first->second;
+      Moved& moved = stretches[{tile.recording, static_cast<Index>((time[i] - begin) / seconds)}];
+      if (moved.rows.size() == 0) moved = {tile.recording, time[i], VectorXd::Zero(tile.moving.cols())};
+      moved.rows += tile.moving.row(i).transpose();
+    }
+  };
+  problem.tiles.for_each([&](std::size_t r) { return problem.test.of_recording[r] >= 0; },
+                         [&](Tile& tile, std::size_t k) { lot[k] = &tile; }, [&](std::size_t k) { count(*lot[k]); });
+  std::vector<Moved> out;
+  for (auto& one : stretches) out.push_back(std::move(one.second));
+  return out;
+}
+
+/// By joint, the first stretch in which it moves in nearly as many rows as in any.
+std::vector<Moved> busiest(const std::vector<Moved>& stretches) {
+  if (stretches.empty()) return {};
+  VectorXd most = stretches.front().rows;
+  for (const Moved& one : stretches) most = most.cwiseMax(one.rows);
+  std::vector<Moved> out;
+  for (Index j = 0; j < most.size(); ++j)
+    out.push_back(*std::find_if(stretches.begin(), stretches.end(),
+                                [&](const Moved& one) { return one.rows[j] >= kBusy * most[j]; }));
+  return out;
+}
+
 }  // namespace
 
 std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named) {
@@ -112,38 +158,45 @@ std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& 
 
 std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named,
                                    double seconds) {
-  const auto joints = static_cast<Index>(problem.robot.driven_count());
+  const std::vector<Moved> chosen = busiest(moving_rows(problem, seconds));
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
-  std::vector<TorqueTrace> out(static_cast<std::size_t>(joints));
-  const auto first =
-      std::find_if(problem.test.of_recording.begin(), problem.test.of_recording.end(), [](int of) { return of >= 0; });
-  if (first == problem.test.of_recording.end()) return {};
-  const auto r = static_cast<std::size_t>(first - problem.test.of_recording.begin());
-  double begin = -1.0;
-  for_each_tile(problem.tiles.recordings()[r], r, problem.robot, problem.tiles.options(), [&](Tile& tile) {
-    const VectorXd time = tile.own_time();
-    if (begin >= 0.0 && time[0] > begin + seconds) return false;
-    const MatrixXd nominal = own_torque(problem.nominal, &tile);
-    const MatrixXd before = own_torque(standard, &tile);
-    const MatrixXd after = own_torque(named, &tile);
-    for (Index i = 0; i < tile.count; ++i) {
-      if (problem.test.fold(r, time[i]) < 0) continue;
-      if (begin < 0.0 && tile.moving.row(i).maxCoeff() > 0.0) begin = time[i];
-      if (begin < 0.0 || time[i] > begin + seconds) continue;
-      for (Index j = 0; j < joints; ++j) {
-        TorqueTrace& trace = out[static_cast<std::size_t>(j)];
-        trace.time.push_back(time[i]);
-        trace.measured.push_back(tile.measured(i, j));
-        trace.nominal.push_back(nominal(i, j));
-        trace.standard.push_back(before(i, j));
-        trace.named.push_back(after(i, j));
+  std::vector<TorqueTrace> out(chosen.size());
+  std::map<std::size_t, std::pair<double, double>> looked_at;  // by recording, its first and last time
+  for (std::size_t j = 0; j < chosen.size(); ++j) {
+    const Moved& one = chosen[j];
+    out[j].recording = problem.tiles.recordings()[one.recording].name;
+    out[j].joint = problem.robot.joints[driven[j]].name;
+    auto& [first, last] = looked_at.try_emplace(one.recording, kNever, -kNever).first->second;
+    first = std::min(first, one.begin);
+    last = std::max(last, one.begin + seconds);
+  }
+  for (const auto& [r, span] : looked_at) {
+    const auto [first, last] = span;
+    const auto draw = [&, r = r](Tile& tile) {
+      const VectorXd time = tile.own_time();
+      const MatrixXd nominal = own_torque(problem.nominal, &tile);
+      const MatrixXd before = own_torque(standard, &tile);
+      const MatrixXd after = own_torque(named, &tile);
+      for (Index i = 0; i < tile.count; ++i) {
+        if (problem.test.fold(r, time[i]) < 0) continue;
+        for (std::size_t k = 0; k < chosen.size(); ++k) {
+          const Moved& one = chosen[k];
+          if (one.recording != r || time[i] < one.begin || time[i] > one.begin + seconds) continue;
+          const auto j = static_cast<Index>(k);
+          out[k].time.push_back(time[i]);
+          out[k].measured.push_back(tile.measured(i, j));
+          out[k].nominal.push_back(nominal(i, j));
+          out[k].standard.push_back(before(i, j));
+          out[k].named.push_back(after(i, j));
+        }
       }
-    }
-    return true;
-  });
-  for (Index j = 0; j < joints; ++j) {
-    out[static_cast<std::size_t>(j)].recording = problem.tiles.recordings()[r].name;
-    out[static_cast<std::size_t>(j)].joint = problem.robot.joints[driven[static_cast<std::size_t>(j)]].name;
+    };
+    for_each_tile(problem.tiles.recordings()[r], r, problem.robot, problem.tiles.options(),
+                  [&, first = first, last = last](Tile& tile) {
+                    const VectorXd time = tile.own_time();
+                    if (time[time.size() - 1] >= first && time[0] <= last) draw(tile);
+                    return time[0] <= last;
+                  });
   }
   return out;
 }

@@ -13,7 +13,8 @@ namespace truing::dynamics {
 /// The gap of every joint by speed, direction, acceleration, load, angle and time, on held-out rows.
 std::vector<TorqueRegime> regimes_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named);
 
-/// At most `seconds` of the first held-out recording, every joint.
+/// At most `seconds` of a held-out recording by joint: the first stretch in which it moves about as much as in any.
+/// Where one joint is moved after the other, each has a time of its own to be looked at.
 std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& standard, const TorqueModel& named,
                                    double seconds = 12.0);
 

@@ -431,14 +431,12 @@ def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence
             )
             owners.append(joint)
     names = {str(trace["name"]) for trace in drawn}
+    recordings = {joint: by_joint[joint]["recording"] for joint in shown}
+    where, labels = _trace_words(recordings, "standard" in names)
     buttons = [
-        {"label": joint, "method": "restyle", "args": ["visible", [owner == joint for owner in owners]]}
-        for joint in shown
+        {"label": label, "method": "restyle", "args": ["visible", [owner == joint for owner in owners]]}
+        for joint, label in zip(shown, labels, strict=True)
     ]
-    first = by_joint[shown[0]]
-    where = f"held out: {escaped(first['recording'])}" if "standard" in names else escaped(first["recording"])
-    if len(shown) > 1 and "standard" in names:
-        where += f"; {escaped(shown[0])} was worst, others to choose"
     page.add(f'<section class="card"><h2>Torque over time <span class="muted">{where}</span></h2>')
     words = {"measured": "measured", "nominal": "nominal model", "standard": "standard practice"}
     words["named"] = "named effects" if "standard" in names else "predicted"
@@ -453,6 +451,18 @@ def _trace_card(page: Page, traces: Sequence[Mapping[str, Any]], order: Sequence
     )
     page.chart("trace", drawn, _trace_layout(buttons), size="trace")
     page.add("</section>")
+
+
+def _trace_words(recordings: Mapping[str, str], judged: bool) -> tuple[str, list[str]]:
+    """What stands beside the title; buttons of joints, worst first, with their recordings if these differ."""
+    joints = list(recordings)
+    apart = len(set(recordings.values())) > 1
+    words = [] if apart else [escaped(recordings[joints[0]])]
+    if judged:
+        words = [": ".join(["held out", *words])]
+        if len(joints) > 1:
+            words.append(f"{escaped(joints[0])} was worst, others to choose")
+    return "; ".join(words), [f"{joint}, {name}" if apart else joint for joint, name in recordings.items()]
 
 
 def _trace_layout(buttons: list[dict[str, Any]]) -> dict[str, Any]:

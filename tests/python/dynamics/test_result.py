@@ -196,6 +196,33 @@ def test_no_line_is_drawn_from_one_held_out_block_to_the_next(simulated: Simulat
         assert np.isnan(unpacked(line[axis])).sum() == apart
 
 
+def one_after_the_other(robot: truing.Robot, joints: range, name: str) -> Recording:
+    """Each of these joints swings for 15 s while the others stand, with dry friction of 2 Nm. Seed 20."""
+    turns = 5 + int(name[-1])
+    time = np.arange(0.0, 15.0 * len(joints), 0.01)
+    position = np.full((len(time), 6), 0.4)
+    for number, joint in enumerate(joints):
+        swings = (time >= 15.0 * number) & (time < 15.0 * (number + 1))
+        position[swings, joint] -= 0.4 * (1.0 - np.cos(2 * np.pi * turns * np.arange(swings.sum()) / 1500))
+    speed, noise = np.gradient(position, 0.01, axis=0), np.random.default_rng(20).normal(size=position.shape)
+    ideal = predict(robot, Recording(name, time=time, position=position)).torque
+    torque = ideal + 2.0 * np.tanh(speed / 0.01) + 0.1 * noise
+    return Recording(name, time=time, position=position, torque=torque, test=name.endswith("2"))
+
+
+def test_every_joint_is_drawn_where_it_moves() -> None:
+    robot = demo_arm()
+    arm = [one_after_the_other(robot, range(3), f"arm{k}") for k in range(3)]
+    wrist = [one_after_the_other(robot, range(3, 6), f"wrist{k}") for k in range(3)]
+    found = diagnose(robot, arm + wrist)
+    assert [trace.recording for trace in found.traces] == 3 * ["arm2"] + 3 * ["wrist2"]
+    for k, trace in enumerate(found.traces):
+        assert 15.0 * (k % 3) - 12.0 < trace.time[0] < 15.0 * (k % 3) + 12.0
+        assert np.std(trace.measured) > 1.5  # at rest: noise
+    buttons = charts_of(diagnosis_page(found, 6))["trace"]["layout"]["updatemenus"][0]["buttons"]
+    assert {button["label"] for button in buttons} >= {"J1, arm2", "J6, wrist2"}
+
+
 def test_a_fit_writes_its_parameters_with_errors(simulated: SimulatedMotion, tmp_path: Path) -> None:
     fit = identify(simulated.nominal, simulated.recordings, effects="coulomb,viscous,load_friction:J2")
     result = write_fit(tmp_path, fit, simulated.recordings)
