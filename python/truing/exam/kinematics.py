@@ -24,6 +24,10 @@ Ints = NDArray[np.int64]
 D, A, ALPHA, BETA = range(4)  # columns of Changes.links
 
 
+class NoRestError(Exception):
+    """The weight bends a spring further than this holds it back: a mechanism buckles."""
+
+
 @dataclass(frozen=True)
 class Chain:
     """A robot as arrays over its joints."""

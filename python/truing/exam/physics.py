@@ -32,6 +32,7 @@ from truing.exam.kinematics import (
     D,
     Floats,
     Ints,
+    NoRestError,
     motions,
     no_changes,
     rotations,
@@ -228,7 +229,7 @@ class Mechanism:
             weight = self._weight()
             if self._give_way(weight, direction, row, afloat=sweep >= _PATIENCE) < _CONVERGED:
                 return
-        raise RuntimeError("a mechanism of the examination does not come to rest")
+        raise NoRestError("a mechanism of the examination does not come to rest")
 
     def _weight(self) -> Floats:
         """Generalised gravity force on every degree of freedom, the loop closed."""

@@ -17,7 +17,7 @@ from numpy.random import Generator
 import truing
 from truing.exam import laws, recordings
 from truing.exam.design import Plan, draw, usual_plan
-from truing.exam.kinematics import Chain, Floats, chain_of, quaternions
+from truing.exam.kinematics import Chain, Floats, NoRestError, chain_of, quaternions
 from truing.exam.laws import LISTED, WHOLE_ROBOT, Context, Hidden, Inputs, motor_torque
 from truing.exam.names import accepted
 from truing.exam.robots import Specimen, specimens
@@ -351,6 +351,14 @@ def sized(scene: Scene, hidden: Hidden, view: View, over_noise: float) -> tuple[
     """An effect so large that what is seen of it is `over_noise` times the noise, and how it moves the tips,
     shape=(n, 3) [m]. None: frames absorb it, or no machine has it so large.
     """
+    try:
+        return _sized(scene, hidden, view, over_noise)
+    except NoRestError:
+        scene.request.throw_away("the arm buckles under its own weight")
+        return None
+
+
+def _sized(scene: Scene, hidden: Hidden, view: View, over_noise: float) -> tuple[Hidden, Floats] | None:
     unit = hidden.law(scene.context)
     first = view.displaced(unit)
     seen, raw = view.rms(first), _spread(first)

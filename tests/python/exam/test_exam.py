@@ -43,7 +43,7 @@ from truing.exam.answers import (
 )
 from truing.exam.builds import package_build
 from truing.exam.design import draw, usual_plan
-from truing.exam.kinematics import Chain, Floats, chain_of, gravity_torques, no_changes, sweep
+from truing.exam.kinematics import Chain, Floats, NoRestError, chain_of, gravity_torques, no_changes, sweep
 from truing.exam.numbering import WHICH
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
 from truing.exam.robots import Specimen, specimens
@@ -179,6 +179,14 @@ def test_a_spring_holds_the_weight_as_the_closed_form_says() -> None:
         assert angle_of(chain, Parts(springs={0: lambda torque: compliance * torque}), [reading])[
             0
         ] == pytest.approx(angle, abs=1e-11)
+
+
+def test_an_arm_that_buckles_is_drawn_anew() -> None:
+    chain, upright = pendulum(), [math.pi / 2 + 1e-3]  # 12 kg 0.8 m above a spring of 20 Nm/rad: it needs 94
+    with pytest.raises(NoRestError):
+        angle_of(chain, Parts(springs={0: lambda torque: 0.05 * torque}), upright)
+    label = sets.build("examination/confounded/4@23").label
+    assert label["drawn_anew"]["the arm buckles under its own weight"] == 1
 
 
 def test_friction_or_weight_decides_the_side_of_a_gap() -> None:
