@@ -25,7 +25,6 @@ namespace truing::diagnosis {
 namespace {
 
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
-constexpr double kTwoFrames = 0.3;   ///< of the median error with one frame, that two frames may leave
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 
 /// What base and targets are fitted by, before statistics.
@@ -167,28 +166,19 @@ double median_error_of(const Robot& robot, const Measurements& data, const Diagn
 /// each other.
 std::optional<SanityFinding> moved_instrument(const Robot& robot, const Measurements& data,
                                               const DiagnoseOptions& options, double together) {
-  if (!data.position[0] || !data.fixed_point.empty() || robot.targets.size() > 1) return {};
+  if (!has_one_frame(data) || robot.targets.size() > 1) return {};
   const Residuals off = residuals(robot, data, options.own_effects, options.threads);
-  model::Positions measured(static_cast<Eigen::Index>(data.rows), 3);
-  std::vector<std::int32_t> rows;
-  for (std::size_t row = 0; row < data.rows; ++row) {
-    const auto i = static_cast<Eigen::Index>(row);
-    for (int k = 0; k < 3; ++k) measured(i, k) = data.position[static_cast<std::size_t>(k)][row];
-    if (off.position.row(i).allFinite()) rows.push_back(static_cast<std::int32_t>(row));
-  }
-  const std::optional<model::FrameChange> change = model::find_frame_change(measured + off.position, measured, rows);
+  const std::optional<model::FrameChange> change = model::find_frame_change(data, off.position);
   if (!change) return {};
   const auto moved = static_cast<std::size_t>(change->row);
   const double apart = std::max(median_error_of(robot, data, options, 0, moved),
                                 median_error_of(robot, data, options, moved, data.rows));
-  if (!(apart < kTwoFrames * together)) return {};
+  if (!(apart < model::kOfTwoFrames * together)) return {};
   SanityFinding out;
   out.kind = "frame_change";
-  out.text = "from row " + std::to_string(moved + 1) +
-             " on everything was measured from another place: the middle of the poses jumps by " +
-             millimetres(change->move) + ", turned by " + number(change->turn / kDegree, 2) +
-             " deg. Either part by itself leaves a median error of " + millimetres(apart) + " or less, both together " +
-             millimetres(together) + ". Bring all rows into one frame, or diagnose the parts by themselves.";
+  out.text = text_of(*change) + ". Either part by itself leaves a median error of " + millimetres(apart) +
+             " or less, both together " + millimetres(together) +
+             ". Bring all rows into one frame, or diagnose the parts by themselves.";
   out.rows = {moved};
   out.mistake = true;
   return out;

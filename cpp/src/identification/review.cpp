@@ -12,6 +12,7 @@
 
 #include "math/constants.hpp"
 #include "math/text.hpp"
+#include "model/frame_change.hpp"
 #include "model/model.hpp"
 #include "model/motion.hpp"
 #include "model/readings.hpp"
@@ -144,6 +145,24 @@ class Trials {
     return identify(robot, thinned(data), frames_alone(robot)).train.after.median;
   }
 
+  /// From where on everything was measured in another frame, if it was; `robot`: as found. With it the median errors of
+  /// all rows with one base and targets, and of the part that is worse with its own [m].
+  struct Moved {
+    FrameChange change;
+    double together, apart;
+  };
+  std::optional<Moved> moved_instrument(const Robot& robot, const Measurements& data) const {
+    if (!has_one_frame(data) || robot.targets.size() > 1) return {};
+    const Residuals off = residuals(robot, data, options_.own_effects, options_.threads);
+    const std::optional<FrameChange> change = find_frame_change(data, off.position);
+    if (!change) return {};
+    const auto at = static_cast<std::size_t>(change->row);
+    const double apart = std::max(error_of(robot, data, 0, at), error_of(robot, data, at, data.rows));
+    const double together = error_of(robot, data, 0, data.rows);
+    if (!(apart < kOfTwoFrames * together)) return {};
+    return Moved{*change, together, apart};
+  }
+
   /// From where on joints and measurements are some rows apart, if they are.
   std::optional<RowSlip> slip(const Robot& robot, const Measurements& data) const {
     FramesFit frames;
@@ -174,6 +193,16 @@ class Trials {
     frames.priors.clear();
     frames.max_iterations = std::min(frames.max_iterations, kIterations);
     return frames;
+  }
+
+  /// Median error of rows `begin` to `end` with base and targets fitted to these alone [m].
+  double error_of(const Robot& robot, const Measurements& data, std::size_t begin, std::size_t end) const {
+    std::vector<double> weights(data.rows, 0.0);
+    for (std::size_t row = begin; row < end; ++row) weights[row] = data.weight ? data.weight[row] : 1.0;
+    Measurements part = data;
+    part.weight = {weights.data(), 1};
+    part.set.assign(data.rows, 0);
+    return identify(robot, part, frames_alone(robot)).train.after.median;
   }
 
   Measurements thinned(const Measurements& data) const {
@@ -247,6 +276,16 @@ Mistake slipped(const RowSlip& slip, std::vector<Parameter> changes) {
   return out;
 }
 
+Mistake moved_from(const Trials::Moved& moved, std::vector<Parameter> changes) {
+  Mistake out;
+  out.kind = "frame_change";
+  out.text = text_of(moved.change) + ". With base and tool of its own either part leaves a median error of " +
+             millimetres(moved.apart) + " or less, both together " + millimetres(moved.together) +
+             ". Bring all rows into one frame, or identify the parts by themselves.";
+  out.changes = std::move(changes);
+  return out;
+}
+
 Mistake unexplained(std::vector<Parameter> changes) {
   Mistake out;
   out.kind = "unexplained";
@@ -264,10 +303,13 @@ Mistake unexplained(std::vector<Parameter> changes) {
 std::optional<Mistake> review(const Robot& nominal, const Measurements& data, const Identification& found,
                               const IdentifyOptions& options) {
   const Workshop workshop(nominal, data);
+  const Trials trials(data, options);
   std::vector<Parameter> changes = workshop.changes(found);
+  for (const Robot* robot : {&found.robot, &nominal}) {
+    if (const auto moved = trials.moved_instrument(*robot, data)) return moved_from(*moved, std::move(changes));
+  }
   const bool much_left = found.train.after.median > kWorthALook * measured_range(data, fitted_rows(found));
   if (changes.empty() && !much_left && !has_rows_far_out(found)) return std::nullopt;
-  const Trials trials(data, options);
   if (const std::optional<RowSlip> slip = trials.slip(nominal, data)) return slipped(*slip, std::move(changes));
   if (changes.empty() && !much_left) return std::nullopt;
   const double as_is = trials.error(nominal, data);

@@ -8,7 +8,9 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "math/constants.hpp"
 #include "math/linear_algebra.hpp"
+#include "math/text.hpp"
 
 namespace truing::model {
 namespace {
@@ -16,7 +18,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kMostOfOneFrame = 0.1;     ///< of the squares that one frame leaves, at most
+constexpr double kMostOfOneFrame = 0.1;  ///< of the squares that one frame leaves, at most
+constexpr std::size_t kLookedAt = 2000;
 constexpr std::size_t kFewestOfAFrame = 8;  ///< rows of a part: a few that stand out are no frame of their own
 
 /// Sums over rows that a frame is fitted by.
@@ -74,12 +77,19 @@ std::optional<FrameChange> find_frame_change(const Positions& predicted, const P
   const double together = rigid_fit_of(all).left;
   double least = kMostOfOneFrame * together;
   std::size_t change = 0;
-  for (std::size_t k = kFewestOfAFrame; k + kFewestOfAFrame <= rows.size(); ++k) {
-    const double left = rigid_fit_of(before[k]).left + rigid_fit_of(all.without(before[k])).left;
-    if (left >= least) continue;
-    least = left;
-    change = k;
-  }
+  const auto look = [&](std::size_t first, std::size_t last, std::size_t step) {
+    for (std::size_t k = std::max(first, kFewestOfAFrame); k <= std::min(last, rows.size() - kFewestOfAFrame);
+         k += step) {
+      const double left = rigid_fit_of(before[k]).left + rigid_fit_of(all.without(before[k])).left;
+      if (left >= least) continue;
+      least = left;
+      change = k;
+    }
+  };
+  // Near the change the squares fall towards it from both sides: of many rows some show where to look at each.
+  const std::size_t step = 1 + rows.size() / kLookedAt;
+  look(0, rows.size(), step);
+  if (change > 0 && step > 1) look(change - std::min(change, step), change + step, 1);
   if (change == 0) return {};
   const FrameSums first = before[change], second = all.without(first);
   const Matrix3d R1 = rigid_fit_of(first).R, R2 = rigid_fit_of(second).R;
@@ -94,6 +104,25 @@ std::optional<FrameChange> find_frame_change(const Positions& predicted, const P
   out.move = (carried(second, R2) - carried(first, R1)).norm();
   out.turn = Eigen::AngleAxisd(Matrix3d(R2 * R1.transpose())).angle();
   return out;
+}
+
+bool has_one_frame(const Measurements& data) { return data.position[0] && !data.distance && data.fixed_point.empty(); }
+
+std::optional<FrameChange> find_frame_change(const Measurements& data, const Positions& off) {
+  Positions measured(off.rows(), 3);
+  std::vector<std::int32_t> rows;
+  for (Eigen::Index row = 0; row < off.rows(); ++row) {
+    for (int k = 0; k < 3; ++k)
+      measured(row, k) = data.position[static_cast<std::size_t>(k)][static_cast<std::size_t>(row)];
+    if (off.row(row).allFinite()) rows.push_back(static_cast<std::int32_t>(row));
+  }
+  return find_frame_change(measured + off, measured, rows);
+}
+
+std::string text_of(const FrameChange& change) {
+  return "from row " + std::to_string(change.row + 1) +
+         " on everything was measured from another place: the middle of the poses jumps by " +
+         math::millimetres(change.move) + ", turned by " + math::number(change.turn / kDegree, 2) + " deg";
 }
 
 }  // namespace truing::model

@@ -6,11 +6,13 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "rooms.hpp"
+#include "truing/model/measurement.hpp"
 
 namespace truing::model {
 
@@ -28,5 +30,18 @@ struct FrameChange {
 /// one. `rows`: of both tables that are looked at, ascending; none of them NaN.
 std::optional<FrameChange> find_frame_change(const Positions& predicted, const Positions& measured,
                                              const std::vector<std::int32_t>& rows);
+
+/// Whether there are positions, and nothing that was measured otherwise.
+bool has_one_frame(const Measurements& data);
+
+/// The same of measured positions of one target, and of what a robot predicts of them less these. `off`: shape=(n, 3)
+/// [m]; NaN: not measured.
+std::optional<FrameChange> find_frame_change(const Measurements& data, const Positions& off);
+
+/// Of the median error with one frame, that each part with its own may leave where the instrument was moved.
+constexpr double kOfTwoFrames = 0.3;
+
+/// "from row 71 on everything was measured from another place: the middle of the poses jumps by ...": rows from 1.
+std::string text_of(const FrameChange& change);
 
 }  // namespace truing::model

@@ -108,6 +108,42 @@ TEST_CASE("measurements that are a row off their joints are found on every arm")
   }
 }
 
+/// From a row on the instrument stands `move` [m] and twice as many radians elsewhere.
+static void move_instrument(Table* table, std::size_t from, double move) {
+  const double c = std::cos(2.0 * move), s = std::sin(2.0 * move);
+  std::vector<double> x(table->data.rows), y(table->data.rows);
+  for (std::size_t row = 0; row < x.size(); ++row) {
+    x[row] = table->data.position[0][row];
+    y[row] = table->data.position[1][row];
+    if (row < from) continue;
+    x[row] = c * x[row] - s * y[row] + move;
+    y[row] = s * table->data.position[0][row] + c * y[row];
+  }
+  table->data.position[0] = table->add(x);
+  table->data.position[1] = table->add(y);
+}
+
+TEST_CASE("an instrument that was moved in the middle is found on every arm") {
+  for (const Robot& robot : some_arms()) {
+    for (const double move : {1e-3, 0.3}) {
+      const auto table = measured(robot, 150, 142);
+      move_instrument(table.get(), 90, move);
+      CAPTURE(move);
+      check_said(robot, table->data, "frame_change", "from row 91 on everything was measured from another place");
+    }
+    const std::optional<Mistake> said = reviewed(robot, measured(robot, 150, 142)->data);
+    CHECK((!said || said->kind != "frame_change"));
+  }
+  Robot truth = ur10();
+  truth.anchor = truing::Anchor{{1.2, -0.8, 0.1}, 0.25};
+  const auto wire = random_joints(truth, 150, 144);  // distances have no frame, and the nominal robot no anchor
+  measure(wire.get(), truth, What::distance, 5e-5, 145);
+  CHECK_FALSE(reviewed(ur10(), wire->data));
+  const auto many = measured(some_arms().front(), 9000, 143);
+  move_instrument(many.get(), 6124, 1e-3);
+  check_said(some_arms().front(), many->data, "frame_change", "from row 6125 on");
+}
+
 TEST_CASE("a measurement that is missing in the middle is found on every arm") {
   for (const Robot& robot : some_arms()) {
     const auto table = measured(robot, 150, 141);
