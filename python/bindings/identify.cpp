@@ -105,6 +105,13 @@ A fit that did not converge returns with solver.converged == False.)");
       py::arg("robot"), py::arg("data"), py::arg("own_effects") = none,
       "True when an effect of the robot needs approach directions that the data lack.");
   m.def(
+      "lacks_speeds",
+      [](const Robot& robot, const Measurements& data, const std::vector<OwnEffect>& own) {
+        return lacks_speeds(robot, data, effects_from(own));
+      },
+      py::arg("robot"), py::arg("data"), py::arg("own_effects") = none,
+      "True when an effect of the robot needs joint speeds that the data lack, and that can be inferred.");
+  m.def(
       "predict",
       [](const Robot& given, const Measurements& data, const std::vector<OwnEffect>& own, int threads) {
         const std::vector<Effect> effects = effects_from(own);

@@ -107,6 +107,8 @@ struct Prediction {
 /// True when an effect of the robot needs approach directions that the data lack. Throws std::invalid_argument on
 /// unknown effects.
 bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {});
+/// The same of joint speeds, which with_inferred_speeds gives of a robot that moved while it was measured.
+bool lacks_speeds(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {});
 
 /// Throws std::invalid_argument on unknown effects or columns that they need.
 Prediction predict(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects = {},

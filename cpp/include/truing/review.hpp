@@ -31,7 +31,8 @@ struct Mistake {
 /// units of angles and lengths, the Denavit-Hartenberg convention. Each is undone, base and targets are fitted, and one
 /// that halves the error is the likely mistake if the refit under it changes no link as much.
 ///
-/// Before that, an instrument that was moved, and a row that is missing in the middle or measured twice, are looked for.
+/// Before that, an instrument that was moved, and a row that is missing in the middle or measured twice, are looked
+/// for.
 ///
 /// `found`: by identify(nominal, data, options). Empty: nothing speaks against it.
 std::optional<Mistake> review(const Robot& nominal, const Measurements& data, const Identification& found,

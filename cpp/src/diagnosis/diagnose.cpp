@@ -152,6 +152,12 @@ void say_what_is_not_testable(const Work& work, Diagnosis* out) {
   }
 }
 
+std::size_t rows_that_count(const Measurements& data) {
+  std::size_t out = 0;
+  for (std::size_t row = 0; row < data.rows; ++row) out += !data.weight || data.weight[row] != 0.0;
+  return out;
+}
+
 void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagnosis* out) {
   std::set<std::size_t> outliers;
   for (const std::int32_t row : work.noise.outliers)
@@ -515,7 +521,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   // 1. and 2. Columns, noise and weights, of all rows or, of very many, evenly some.
   const std::vector<std::int32_t> rows = thinned_rows(whole.data, whole.cluster, options.search_poses);
   const bool thinned = rows.size() < whole.data.rows;
-  if (thinned)
+  if (rows.size() < rows_that_count(whole.data))
     result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) +
                               " rows; fitted and judged on all");
   Work work = prepare_under_gravity(&whole, rows, &robot, &result);

@@ -17,15 +17,20 @@
 #include "math/statistics.hpp"
 #include "math/text.hpp"
 #include "model/frame_change.hpp"
+#include "model/motion.hpp"
 #include "model/readings.hpp"
 #include "model/repeats.hpp"
 #include "model/row_slip.hpp"
+#include "model/time_series.hpp"
 
 namespace truing::diagnosis {
 namespace {
 
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
+constexpr std::size_t kFewRows = 300;
+constexpr double kMostLag = 0.5, kLagStep = 0.02, kLagResolution = 1e-5;  ///< [s]
+constexpr double kSmall = 0.1;                                            ///< of the error that is left
 
 /// What base and targets are fitted by, before statistics.
 IdentifyOptions frames_alone(const Robot& robot, const DiagnoseOptions& options) {
@@ -244,6 +249,88 @@ void try_readings(const Robot& robot, const DiagnoseOptions& options, double spr
   out->findings.push_back(finding);
 }
 
+/// Median error with base and targets fitted to a few rows, with the joints as they were `later` [s].
+double error_of_joints_at(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, double later) {
+  const Measurements moved = model::with_joints_at(data, later);
+  Measurements some = subset_of(moved, sample_of(moved, kFewRows).rows);
+  some.set.assign(some.rows, 0);
+  return identify(robot, some, frames_alone(robot, options)).train.after.median;
+}
+
+/// Where the error is least: steps as long as kLagStep, then the golden section around the best of them.
+double best_lag(const std::function<double(double)>& error) {
+  constexpr double kGolden = 0.6180339887498949;
+  double best = 0.0, least = error(0.0);
+  for (double later = -kMostLag; later < kMostLag + 0.5 * kLagStep; later += kLagStep) {
+    const double here = error(later);
+    if (!(here < least)) continue;
+    least = here;
+    best = later;
+  }
+  double low = best - kLagStep, high = best + kLagStep;
+  double one = high - kGolden * (high - low), other = low + kGolden * (high - low);
+  double at_one = error(one), at_other = error(other);
+  while (high - low > kLagResolution) {
+    if (at_one < at_other) {
+      high = other;
+      other = one;
+      at_other = at_one;
+      one = high - kGolden * (high - low);
+      at_one = error(one);
+    } else {
+      low = one;
+      one = other;
+      at_one = at_other;
+      other = low + kGolden * (high - low);
+      at_other = error(other);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+/// How far a tip is off where joints are taken `later` [s] by their speeds alone, rms [m].
+double beyond_first_order(const Robot& robot, const Measurements& data, double later) {
+  const Measurements now = model::with_joints_at(data, 0.0), then = model::with_joints_at(data, later);
+  double squares = 0.0;
+  for (std::size_t k = 0; k < data.joints.size(); ++k) {
+    for (std::size_t row = 0; row < data.rows; ++row) {
+      if (!(then.weight[row] > 0.0)) continue;
+      squares += std::pow(then.joints[k][row] - now.joints[k][row] - later * now.joint_speed[k][row], 2.0);
+    }
+  }
+  return model::stretched_length(robot) * std::sqrt(squares / static_cast<double>(data.rows));
+}
+
+/// Clocks of joints and measurement that differ by so much that speeds alone do not say what it does: beyond doubt, and
+/// undone. Less than that is an effect.
+void undo_lag(const Robot& robot, const DiagnoseOptions& options, double spread, Checked* out) {
+  if (!model::moved_while_measured(out->data)) return;
+  const auto error = [&](double later) { return error_of_joints_at(robot, out->data, options, later); };
+  const double as_is = error(0.0);
+  if (!(as_is > kWorthALook * spread)) return;
+  const double later = best_lag(error), left = error(later);
+  if (!(left < 0.5 * as_is) || beyond_first_order(robot, out->data, later) < kSmall * left) return;
+  out->data = model::with_joints_at(out->data, later);
+  out->findings.push_back({"lag",
+                           "the clocks of joints and measurement differ: what was measured belongs to where the joints "
+                           "were " +
+                               number(1e3 * std::abs(later), 3) + " ms " + (later > 0.0 ? "later" : "earlier") + " (" +
+                               millimetres(left) + " in place of " + millimetres(as_is) +
+                               ", by base and tool alone). The diagnosis goes on with joints between the rows, there. "
+                               "Correct the file.",
+                           {}});
+}
+
+void infer_speeds(Checked* out) {
+  if (!out->data.joint_speed.empty()) return;
+  out->data = with_inferred_speeds(out->data);
+  if (out->data.joint_speed.empty()) return;
+  out->findings.push_back({"speed",
+                           "the robot moved while it was measured, and there are no columns qd1 …: joint speeds were "
+                           "inferred from joints and times.",
+                           {}});
+}
+
 void infer_directions(Checked* out) {
   if (!out->data.direction.empty()) return;
   out->data = with_inferred_directions(out->data);
@@ -271,7 +358,10 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
   std::vector<std::int32_t> rows(data.rows);
   std::iota(rows.begin(), rows.end(), 0);
   const double range = measured_range(data, rows);
-  try_readings(robot, options, range > 0.0 ? range : 1.0, &out);
+  const double spread = range > 0.0 ? range : 1.0;
+  undo_lag(robot, options, spread, &out);
+  infer_speeds(&out);
+  try_readings(robot, options, spread, &out);
   infer_directions(&out);
   return out;
 }

@@ -1017,8 +1017,9 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   return result;
 }
 
-bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects) {
-  if (!data.direction.empty() || robot.effects.empty()) return false;
+/// Whether effects of the robot can be predicted with other data alone.
+static bool lacks(const Robot& robot, const Measurements& data, const Measurements& with,
+                  const std::vector<Effect>& own_effects) {
   const auto works_with = [&](const AppliedEffect& effect, const Measurements& some) {
     try {
       effect_terms({{effect.effect, effect.joints}}, robot, some, own_effects);
@@ -1027,10 +1028,19 @@ bool lacks_directions(const Robot& robot, const Measurements& data, const std::v
     }
     return true;
   };
-  const Measurements with = with_inferred_directions(data);
   return std::any_of(robot.effects.begin(), robot.effects.end(), [&](const AppliedEffect& effect) {
     return !works_with(effect, data) && works_with(effect, with);
   });
+}
+
+bool lacks_directions(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects) {
+  return data.direction.empty() && !robot.effects.empty() &&
+         lacks(robot, data, with_inferred_directions(data), own_effects);
+}
+
+bool lacks_speeds(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects) {
+  return data.joint_speed.empty() && !robot.effects.empty() &&
+         lacks(robot, data, with_inferred_speeds(data), own_effects);
 }
 
 Prediction predict(const Robot& robot, const Measurements& data, const std::vector<Effect>& own_effects, int threads) {

@@ -358,6 +358,17 @@ void bind_recorded(Class& cls) {
       "More columns by name, each of shape (n,).");
 }
 
+using Table = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+Table table_of(const std::vector<Column>& columns, std::size_t rows) {
+  Table out(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index k = 0; k < out.cols(); ++k) {
+    for (Eigen::Index row = 0; row < out.rows(); ++row)
+      out(row, k) = columns[static_cast<std::size_t>(k)][static_cast<std::size_t>(row)];
+  }
+  return out;
+}
+
 }  // namespace
 
 void bind_measurement(py::module_& m) {
@@ -410,19 +421,16 @@ Checked are: counts that do not fit the robot, joints or inputs that are not fin
       "joint readings.");
   m.def(
       "inferred_directions",
-      [](const Measurements& data) {
-        const Measurements with = with_inferred_directions(data);
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> out(
-            static_cast<Eigen::Index>(with.rows), static_cast<Eigen::Index>(with.direction.size()));
-        for (Eigen::Index k = 0; k < out.cols(); ++k) {
-          for (Eigen::Index row = 0; row < out.rows(); ++row)
-            out(row, k) = with.direction[static_cast<std::size_t>(k)][static_cast<std::size_t>(row)];
-        }
-        return out;
-      },
+      [](const Measurements& data) { return table_of(with_inferred_directions(data).direction, data.rows); },
       py::arg("data"),
       "shape=(n, driven joints): approach directions -1, 0, 1 as the order of the rows shows them, if the poses were "
       "driven to one after the other.");
+  m.def(
+      "inferred_speeds",
+      [](const Measurements& data) { return table_of(with_inferred_speeds(data).joint_speed, data.rows); },
+      py::arg("data"),
+      "shape=(n, driven joints) [rad/s | m/s]: joint speeds as joints and times show them, of a robot that moved while "
+      "it was measured; shape=(n, 0) of one that stopped for each row.");
 }
 
 }  // namespace truing::python

@@ -188,7 +188,7 @@ def trouble(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Findings about the data that make conclusions doubtful; the others of `sanity` say how the data were
     read.
     """
-    calm = {"direction", *READ_OTHERWISE}
+    calm = {"direction", "speed", *READ_OTHERWISE}
     if result["joint_record"] in ("", "q"):
         calm.add("joint_record")
     if not _many_outliers(result):

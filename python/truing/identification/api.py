@@ -94,11 +94,12 @@ def predict(
     effects: definitions of own effects that the robot carries. Those of the catalogue are known.
 
     Warns (InputWarning) of rows beyond the ranges that the effects were fitted on, and when an effect needs
-    approach directions that the data lack: they are inferred from the order of the rows, as `diagnose` does.
+    approach directions that the data lack: they are inferred from the order of the rows, as `diagnose` does,
+    and so are joint speeds of a robot that moved while it was measured.
     Raises InputError on unknown effects or columns that they need.
     """
     own = evaluated(own_effects(effects), robot, data)
-    data = _with_directions(robot, data, own)
+    data = _with_inferred(robot, data, own)
     _warn_of_rows_beyond(robot, data)
     return _core.predict(robot, data, own, threads)
 
@@ -112,21 +113,30 @@ def residuals(
     errors are as in `predict`.
     """
     own = evaluated(own_effects(effects), robot, data)
-    data = _with_directions(robot, data, own)
+    data = _with_inferred(robot, data, own)
     _warn_of_rows_beyond(robot, data)
     return _core.residuals(robot, data, own, threads)
 
 
-def _with_directions(robot: Robot, data: Measurements, own: Sequence[_core.OwnEffect]) -> Measurements:
-    if not _core.lacks_directions(robot, data, own):
-        return data
-    warnings.warn(
-        "no columns dir1 ...: the approach directions that the robot's effects need were inferred from the"
-        " order of the rows, as if the poses had been driven to one after the other",
-        InputWarning,
-        stacklevel=3,
-    )
-    return data.replace(directions=_core.inferred_directions(data))
+def _with_inferred(robot: Robot, data: Measurements, own: Sequence[_core.OwnEffect]) -> Measurements:
+    """The data with what the robot's effects need and rows that follow each other show."""
+    if _core.lacks_directions(robot, data, own):
+        warnings.warn(
+            "no columns dir1 ...: the approach directions that the robot's effects need were inferred from"
+            " the order of the rows, as if the poses had been driven to one after the other",
+            InputWarning,
+            stacklevel=3,
+        )
+        data = data.replace(directions=_core.inferred_directions(data))
+    if _core.lacks_speeds(robot, data, own):
+        warnings.warn(
+            "no columns qd1 ...: the joint speeds that the robot's effects need were inferred from joints and"
+            " times",
+            InputWarning,
+            stacklevel=3,
+        )
+        data = data.replace(joint_speeds=_core.inferred_speeds(data))
+    return data
 
 
 def _warn_of_rows_beyond(robot: Robot, data: Measurements) -> None:

@@ -781,6 +781,58 @@ TEST_CASE("diagnose says from which row on the instrument stood elsewhere, and n
   CHECK_FALSE(finding(diagnose(light_arm(), measured(light_arm(), 120, 916)->data), "frame_change"));
 }
 
+/// An arm in motion, seen 50 times a second by a tracker whose clock is `late` seconds behind the joints'.
+static std::unique_ptr<Table> streamed(const Robot& truth, double late) {
+  const std::size_t rows = 900;
+  const auto now = std::make_unique<Table>(rows);
+  auto table = std::make_unique<Table>(rows);
+  std::vector<double> time;
+  for (std::size_t row = 0; row < rows; ++row) time.push_back(0.02 * static_cast<double>(row));
+  for (std::size_t k = 0; k < 6; ++k) {
+    const auto joint = [k](double t) {
+      const double n = static_cast<double>(k);
+      return 0.8 * std::sin((1.3 + 0.17 * n) * t + n) + 0.5 * std::cos((0.31 + 0.05 * n) * t) + (k == 1 ? -1.0 : 0.2);
+    };
+    std::vector<double> read, seen;
+    for (const double t : time) {
+      read.push_back(joint(t));
+      seen.push_back(joint(t - late));
+    }
+    table->data.joints.push_back(table->add(read));
+    now->data.joints.push_back(now->add(seen));
+  }
+  measure(now.get(), truth, What::position, kNoise, 930);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<double> column(rows);
+    for (std::size_t row = 0; row < rows; ++row) column[row] = now->data.position[k][row];
+    table->data.position[k] = table->add(column);
+  }
+  table->data.time = table->add(time);
+  return table;
+}
+
+TEST_CASE(
+    "of an arm that moves while it is measured, clocks that differ are an effect, or undone where they differ much") {
+  Robot truth = light_arm();
+  truth.T_measurement_base = somewhere();
+  const Diagnosis right = diagnose(light_arm(), streamed(truth, 0.0)->data);
+  CHECK(finding(right, "speed"));
+  CHECK(right.effects.empty());
+  const Diagnosis little = diagnose(light_arm(), streamed(truth, 0.002)->data);
+  INFO(names(little));
+  CHECK_FALSE(finding(little, "lag"));
+  REQUIRE(little.effects.size() == 1);
+  CHECK(little.effects[0].effect == "time_offset");
+  CHECK(little.effects[0].parameters[0].value == doctest::Approx(-0.002).epsilon(0.01));
+  const Diagnosis much = diagnose(light_arm(), streamed(truth, 0.035)->data);
+  INFO(names(much));
+  REQUIRE(finding(much, "lag"));
+  CHECK_FALSE(finding(much, "lag")->mistake);
+  CHECK(finding(much, "lag")->text.find("were 35 ms earlier") != std::string::npos);
+  CHECK(much.effects.empty());
+  CHECK(much.gap.rms < 1.2 * right.gap.rms);
+}
+
 /// What was measured in each row is what was measured in row `from(row)`.
 static void measure_again(Table* table, const std::function<std::size_t(std::size_t)>& from) {
   for (Column& column : table->data.position) {

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <random>
@@ -9,6 +10,7 @@
 
 #include <doctest/doctest.h>
 
+#include "model/time_series.hpp"
 #include "support/contains.hpp"
 #include "truing/model/measurement.hpp"
 
@@ -195,3 +197,73 @@ TEST_CASE("many poses with repeats are told apart") {
 }
 
 TEST_CASE("no rows make no groups") { CHECK(truing::pose_groups(Measurements()).empty()); }
+
+namespace {
+
+/// Two joints in motion, 50 rows a second.
+struct Stream {
+  std::vector<double> time, q1, q2;
+
+  static double first(double t) { return std::sin(2.0 * t); }
+  static double second(double t) { return 0.3 * t - 0.5 * std::cos(t); }
+
+  explicit Stream(std::size_t rows) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      time.push_back(0.02 * static_cast<double>(row) + (row >= 100 ? 1.0 : 0.0));  // a gap of a second
+      q1.push_back(first(time.back()));
+      q2.push_back(second(time.back()));
+    }
+  }
+  Measurements measurements() const {
+    Measurements data;
+    data.rows = time.size();
+    data.joints = {{q1.data(), 1}, {q2.data(), 1}};
+    data.time = {time.data(), 1};
+    return data;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("speeds of a robot that moves while it is measured are inferred, of one that stops are not") {
+  Stream stream(200);
+  const Measurements with = truing::with_inferred_speeds(stream.measurements());
+  REQUIRE(with.joint_speed.size() == 2);
+  for (std::size_t row = 0; row < 200; ++row) {
+    const double t = stream.time[row];
+    const bool one_sided = row == 0 || row == 99 || row == 100 || row == 199;
+    CHECK(with.joint_speed[0][row] == doctest::Approx(2.0 * std::cos(2.0 * t)).epsilon(one_sided ? 0.06 : 6e-4));
+    CHECK(std::abs(with.joint_speed[1][row] - 0.3 - 0.5 * std::sin(t)) < (one_sided ? 6e-3 : 4e-5));
+  }
+  Measurements known = stream.measurements();
+  known.joint_speed = {{stream.q2.data(), 1}, {stream.q1.data(), 1}};
+  CHECK(truing::with_inferred_speeds(known).joint_speed[0].data == stream.q2.data());
+  Stream slow = stream;
+  for (double& t : slow.time) t *= 20.0;  // a row every 0.4 s: it may stop for each
+  CHECK(truing::with_inferred_speeds(slow.measurements()).joint_speed.empty());
+  Stream poses = stream;
+  std::mt19937_64 random(20);
+  for (double& q : poses.q1) q = static_cast<double>(random() % 1000) / 300.0;
+  CHECK(truing::with_inferred_speeds(poses.measurements()).joint_speed.empty());
+  std::swap(stream.time[7], stream.time[8]);
+  CHECK(truing::with_inferred_speeds(stream.measurements()).joint_speed.empty());
+}
+
+TEST_CASE("joints of another instant are between the rows") {
+  const Stream stream(200);
+  for (const double later : {-0.035, 0.0, 0.004, 0.051}) {
+    const Measurements then = truing::model::with_joints_at(stream.measurements(), later);
+    for (std::size_t row = 0; row < 200; ++row) {
+      const double t = stream.time[row] + later;
+      const bool between =
+          (t >= stream.time[0] && t <= stream.time[99]) || (t >= stream.time[100] && t <= stream.time[199]);
+      CAPTURE(later);
+      CAPTURE(row);
+      CHECK(then.weight[row] == (between ? 1.0 : 0.0));
+      if (!between) continue;
+      CHECK(std::abs(then.joints[0][row] - Stream::first(t)) < 2e-4);
+      CHECK(std::abs(then.joints[1][row] - Stream::second(t)) < 2e-5);
+      CHECK(std::abs(then.joint_speed[1][row] - 0.3 - 0.5 * std::sin(t)) < 6e-3);
+    }
+  }
+}

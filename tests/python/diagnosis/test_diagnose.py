@@ -348,6 +348,25 @@ def test_directions_that_were_inferred_are_written_and_serve_the_robot_file() ->
     assert result["after"]["rms_m"] == pytest.approx(given["after"]["rms_m"], rel=0.1)
 
 
+def test_speeds_that_were_inferred_serve_the_robot_file() -> None:
+    robot, time = truing.load_robot(ROBOT), np.arange(0.0, 16.0, 0.02)
+
+    def joints(at: Any) -> Any:
+        return np.stack([0.4 * np.sin((0.9 + 0.2 * k) * at + k) - 0.2 * (k == 1) for k in range(6)], axis=1)
+
+    # The tracker's clock is 3 ms late. Seed 20.
+    seen = truing.predict(robot, truing.Measurements(joints(time - 0.003))).position
+    noisy = np.asarray(seen) + 3e-5 * np.random.default_rng(20).normal(size=(len(time), 3))
+    data = truing.Measurements(joints(time), positions=noisy, time=time)
+    result = diagnosed(data)
+    assert [s["kind"] for s in result["sanity"]] == ["speed", "direction"]
+    assert [e["effect"] for e in result["effects"]] == ["time_offset"]
+    assert "Look at the data first" not in Path("found/report.html").read_text()
+    with pytest.warns(InputWarning, match="joint speeds that the robot's effects need were inferred"):
+        again = rms_of_robot_file(data)
+    assert again == pytest.approx(result["after"]["rms_m"], rel=1e-6)
+
+
 def test_rows_beyond_what_effects_were_fitted_on_are_warned_of() -> None:
     data = measured("effects")
     diagnosed(data)

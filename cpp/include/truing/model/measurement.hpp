@@ -67,4 +67,9 @@ std::vector<std::int32_t> pose_groups(const Measurements& data);
 /// directions stay as they are.
 Measurements with_inferred_directions(const Measurements& data);
 
+/// The data with joint speeds as joints and times show them, if the robot moved while it was measured: rows follow each
+/// other more quickly than it can stop (0.25 s), each joint about midway between the rows beside it. Slopes of
+/// parabolas through three rows. Other data, and those that have speeds, stay as they are.
+Measurements with_inferred_speeds(const Measurements& data);
+
 }  // namespace truing

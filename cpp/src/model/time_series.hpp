@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Measurements of a robot that moves: rows follow each other as a tracker streams them, and no joint stands still for
+// its row.
+
+#include "rooms.hpp"
+#include "truing/model/measurement.hpp"
+
+namespace truing::model {
+
+/// Whether rows follow each other more quickly than a robot can stop and be measured, each joint about midway between
+/// the rows beside it. Times must ascend.
+bool moved_while_measured(const Measurements& data);
+
+/// The data with the joints as they were `later` seconds after each row: cubics through readings and speeds (Hermite).
+/// Speeds as inferred. Rows for which there is no reading on both sides have the weight zero.
+Measurements with_joints_at(const Measurements& data, double later);
+
+}  // namespace truing::model
