@@ -4,6 +4,7 @@
 #include "estimation/clustered.hpp"
 
 #include <algorithm>
+#include <map>
 
 #include "kernel/kernel.hpp"
 #include "math/linear_algebra.hpp"
@@ -95,6 +96,54 @@ void add_products(Eigen::Index count, Scores* scores, std::vector<double>* sums)
                static_cast<int>(padded), sums->data());
 }
 
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Unit-weight residuals and Jacobian of one cluster.
+struct Block {
+  Eigen::VectorXd residual;
+  RowMajor jacobian;  ///< shape=(values, parameters)
+};
+
+/// One block for each cluster that has a row, in the order of the clusters' numbers.
+std::map<std::int32_t, Block> blocks_of(const FittedRows& fitted, const Eigen::VectorXd& values,
+                                        const Weighing& weighing, const std::vector<std::int32_t>& cluster) {
+  const Evaluator evaluator(fitted.model, fitted.data, fitted.bases, make_segments(fitted.data, fitted.rows),
+                            fitted.free, fitted.threads);
+  const auto p = static_cast<Eigen::Index>(fitted.free.size());
+  std::map<std::int32_t, Block> out;
+  for (int tile = 0; tile < evaluator.tile_count(); ++tile) {
+    const int components = evaluator.tile_components(tile), count = evaluator.tile_rows(tile);
+    Eigen::VectorXd residual(components * count);
+    RowMajor jacobian(components * count, p);
+    evaluator.tile(tile, values, weighing, residual.data(), jacobian.data());
+    for (int i = 0; i < count; ++i) {
+      Block& block = out[cluster[static_cast<std::size_t>(evaluator.tile_numbers(tile)[i])]];
+      const Eigen::Index before = block.residual.size();
+      block.residual.conservativeResize(before + components);
+      block.jacobian.conservativeResize(before + components, p);
+      block.residual.tail(components) = residual.segment(i * components, components);
+      block.jacobian.bottomRows(components) = jacobian.middleRows(i * components, components);
+    }
+  }
+  return out;
+}
+
+/// J^T (I - H)^-1/2 r of a cluster, by the singular values of J root^T, of which the smaller product has the squares:
+/// H = B B^T = U h U^T, or B^T B = V h V^T and (I - H)^-1/2 = I + B V diag(((1 - h)^-1/2 - 1) / h) V^T B^T.
+Eigen::VectorXd adjusted_score(const Block& block, const Eigen::MatrixXd& root) {
+  const Eigen::MatrixXd B = block.jacobian * root.transpose();
+  const bool wide = B.rows() <= B.cols();
+  const Eigen::MatrixXd squares = wide ? Eigen::MatrixXd(B * B.transpose()) : Eigen::MatrixXd(B.transpose() * B);
+  const auto eigen = math::symmetric_eigen<Eigen::Dynamic>(squares);
+  const Eigen::ArrayXd h = eigen.values.array().max(0.0).min(kMostLeverage), factor = (1.0 - h).rsqrt();
+  const Eigen::VectorXd& r = block.residual;
+  if (wide)
+    return block.jacobian.transpose() * (eigen.vectors * (factor * (eigen.vectors.transpose() * r).array()).matrix());
+  const Eigen::ArrayXd added = (h > 1e-12).select((factor - 1.0) / h.max(1e-12), 0.5);
+  const Eigen::VectorXd inside = eigen.vectors.transpose() * (B.transpose() * r);
+  return block.jacobian.transpose() * (r + B * (eigen.vectors * (added * inside.array()).matrix()));
+}
+
 }  // namespace
 
 std::size_t clusters_in(const std::vector<std::int32_t>& rows, const std::vector<std::int32_t>& cluster) {
@@ -128,6 +177,17 @@ Eigen::MatrixXd clustered_scores(const FittedRows& fitted, const Eigen::VectorXd
   Eigen::MatrixXd upper = Eigen::MatrixXd::Zero(p, p);
   run.gram_reduce(sums.data(), p, upper.data());
   return upper.selfadjointView<Eigen::Upper>();
+}
+
+Eigen::MatrixXd few_clusters_scores(const FittedRows& fitted, const Eigen::VectorXd& values, const Weighing& weighing,
+                                    const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster) {
+  const Eigen::MatrixXd root = root_of(inverse);
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(inverse.rows(), inverse.cols());
+  for (const auto& [number, block] : blocks_of(fitted, values, weighing, cluster)) {
+    const Eigen::VectorXd score = adjusted_score(block, root);
+    out.noalias() += score * score.transpose();
+  }
+  return out;
 }
 
 }  // namespace truing::estimation

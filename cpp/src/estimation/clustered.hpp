@@ -35,4 +35,11 @@ std::size_t clusters_in(const std::vector<std::int32_t>& rows, const std::vector
 Eigen::MatrixXd clustered_scores(const FittedRows& fitted, const Eigen::VectorXd& values, const Weighing& weighing,
                                  const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster);
 
+/// The same of few clusters, of which some decide much of the fit: sum over c of g_c g_c^T with g_c = J_c^T (I -
+/// H_c)^-1/2 r_c and the whole leverage H_c = J_c H^-1 J_c^T of c's values, unit-weight J and r (CR2: Bell and
+/// McCaffrey, Survey Methodology 28 (2002) 169). Where noise is the same everywhere its mean is the noise's. It needs J
+/// in memory.
+Eigen::MatrixXd few_clusters_scores(const FittedRows& fitted, const Eigen::VectorXd& values, const Weighing& weighing,
+                                    const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster);
+
 }  // namespace truing::estimation

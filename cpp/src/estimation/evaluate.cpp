@@ -667,6 +667,10 @@ int Evaluator::tile_rows(int tile) const { return impl_->tiles[tile].count; }
 int Evaluator::tile_components(int tile) const {
   return components_of(impl_->segments[impl_->tiles[tile].segment].kind);
 }
+const std::int32_t* Evaluator::tile_numbers(int tile) const {
+  const Impl::TileRange& range = impl_->tiles[tile];
+  return impl_->segments[range.segment].rows.data() + range.first;
+}
 
 void Evaluator::tile(int tile, const Eigen::VectorXd& values, const Weighing& weighing, double* residual,
                      double* jacobian) const {

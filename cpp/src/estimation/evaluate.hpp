@@ -100,8 +100,9 @@ class Evaluator {
   /// Residual (and, if not null, row-major Jacobian) of tile `tile`, weighted, for solvers that want rows. Returns
   /// components.
   int tile_count() const;
-  int tile_rows(int tile) const;        ///< poses in it
-  int tile_components(int tile) const;  ///< residual components per pose
+  int tile_rows(int tile) const;                     ///< poses in it
+  int tile_components(int tile) const;               ///< residual components per pose
+  const std::int32_t* tile_numbers(int tile) const;  ///< of its rows, in the data
   void tile(int tile, const Eigen::VectorXd& values, const Weighing& weighing, double* residual,
             double* jacobian) const;
 

@@ -710,17 +710,36 @@ constexpr std::size_t kPosesPerParameter = 2;
 
 /// Covariance with every pose's residuals as one observation, H^-1 M H^-1 (Liang and Zeger 1986); priors scatter as
 /// the noise does that they are weighed against. Nothing is known where poses are too few.
-std::optional<Eigen::MatrixXd> clustered_by_pose(const Job& job, const Fit& found,
-                                                 const std::vector<std::int32_t>& rows,
+std::optional<Eigen::MatrixXd> clustered_by_pose(const FittedRows& fitted, const Fit& found,
                                                  const std::vector<std::int32_t>& pose, const Eigen::MatrixXd& inverse,
                                                  double sigma2) {
-  if (clusters_in(rows, pose) < kPosesPerParameter * found.fitted.size()) return std::nullopt;
+  if (clusters_in(fitted.rows, pose) < kPosesPerParameter * fitted.free.size()) return std::nullopt;
   Weighing weighing = found.weighing;
   weighing.prior = {};
-  Eigen::MatrixXd middle = clustered_scores({job.model, job.data, job.bases, found.fitted, rows, job.options.threads},
-                                            found.values, weighing, inverse, pose);
+  Eigen::MatrixXd middle = clustered_scores(fitted, found.values, weighing, inverse, pose);
   if (found.weighing.prior.weight.size() > 0) middle.diagonal() += sigma2 * found.weighing.prior.weight;
   return inverse * middle * inverse;
+}
+
+/// From so many poses a parameter on, none decides much of the fit: the leverage of each one's mean will do.
+constexpr std::size_t kManyPosesPerParameter = 10;
+
+/// Covariance of few poses, clustered, with the whole leverage of each. Their scores span as many directions as there
+/// are poses. What lacks to two poses a parameter is `plain` in their place, s^2 H^-1 or the like, as large as theirs
+/// (shrinking as Ledoit and Wolf, J. Multivariate Analysis 88 (2004) 365, do). Nothing is known where half of all
+/// directions would be missing.
+std::optional<Eigen::MatrixXd> clustered_by_few_poses(const FittedRows& fitted, const Fit& found,
+                                                      const std::vector<std::int32_t>& pose,
+                                                      const NormalEquations& normal, const Eigen::MatrixXd& inverse,
+                                                      const Eigen::MatrixXd& plain) {
+  const auto p = static_cast<double>(fitted.free.size());
+  const double lacking = 1.0 - static_cast<double>(clusters_in(fitted.rows, pose)) / (kPosesPerParameter * p);
+  if (lacking > 0.75) return std::nullopt;
+  const Eigen::MatrixXd middle = few_clusters_scores(fitted, found.values, found.weighing, inverse, pose);
+  const Eigen::MatrixXd clustered = inverse * middle * inverse;
+  if (lacking <= 0.0) return clustered;
+  const double as_large = middle.cwiseProduct(inverse).sum() / plain.cwiseProduct(normal.gram).sum();
+  return (1.0 - lacking) * clustered + lacking * as_large * plain;
 }
 
 /// Covariance clustered by pose. Where poses are few, with positions and rotations each at the noise they show: H^-1
@@ -759,7 +778,10 @@ Uncertainty uncertainty(const Job& job, const Fit& found, const std::vector<std:
     out.covariance = inverse * (sigma2 * position.gram + sigma2_rotation * rotation_gram) * inverse;
     out.rotation_noise = std::sqrt(sigma2_rotation) / found.weighing.rotation_scale;
   }
-  if (auto clustered = clustered_by_pose(job, found, rows, pose, inverse, sigma2))
+  const FittedRows fitted{job.model, job.data, job.bases, found.fitted, rows, job.options.threads};
+  const bool few = known.size() == 0 && clusters_in(rows, pose) < kManyPosesPerParameter * found.fitted.size();
+  if (auto clustered = few ? clustered_by_few_poses(fitted, found, pose, all, inverse, out.covariance)
+                           : clustered_by_pose(fitted, found, pose, inverse, sigma2))
     out.covariance = std::move(*clustered);
   out.noise = std::sqrt(sigma2);
   if (job.data.position_sigma || job.data.weight) {  // unit-weight residuals are not metres then

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <Eigen/Eigenvalues>
+
 #include "estimation/clustered.hpp"
 #include "estimation/evaluate.hpp"
 #include "support/arms.hpp"
@@ -272,6 +274,58 @@ TEST_CASE("scores of clusters equal the dense ones, with the same bits on one an
       const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(j.cols(), j.cols());
       const Eigen::MatrixXd plain = scores_by_hand(j, r, components, none, cluster);
       CHECK((scores(2, none) - plain).cwiseAbs().maxCoeff() < 1e-10 * plain.cwiseAbs().maxCoeff());
+    }
+  }
+}
+
+/// sum over clusters of g g^T, g = J^T (I - H)^-1/2 r, by the dense inverse root of every cluster's own matrix.
+Eigen::MatrixXd few_scores_by_hand(const Eigen::MatrixXd& j, const Eigen::VectorXd& r, int components,
+                                   const Eigen::MatrixXd& inverse, const std::vector<std::int32_t>& cluster) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(j.cols(), j.cols());
+  for (std::int32_t c = 0; c <= *std::max_element(cluster.begin(), cluster.end()); ++c) {
+    std::vector<Eigen::Index> own;
+    for (std::size_t row = 0; row < cluster.size(); ++row) {
+      for (int k = 0; k < components && cluster[row] == c; ++k)
+        own.push_back(static_cast<Eigen::Index>(row) * components + k);
+    }
+    const Eigen::MatrixXd block = j(own, Eigen::all);
+    const auto n = static_cast<Eigen::Index>(own.size());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> left(Eigen::MatrixXd::Identity(n, n) -
+                                                              block * inverse * block.transpose());
+    const Eigen::VectorXd score = block.transpose() * (left.operatorInverseSqrt() * r(own));
+    out += score * score.transpose();
+  }
+  return out;
+}
+
+TEST_CASE("scores of few clusters equal the dense ones, of clusters smaller and larger than the parameters") {
+  Robot truth = palletizer();
+  for (const What what : {What::pose, What::position}) {
+    const int components = what == What::pose ? 6 : 3;
+    CAPTURE(components);
+    auto table = random_joints(truth, 90, 84);
+    measure(table.get(), truth, what, 1e-4, 85);
+    const Model model = make_model(truth, table->data);
+    const auto bases = make_bases(model, table->data);
+    const std::vector<std::int32_t> every = all_rows(table->data);
+    const std::vector<int> free = all_parameters(model);
+    const Evaluator evaluator(model, table->data, bases, make_segments(table->data, every), free, 1);
+    Eigen::VectorXd r;
+    Eigen::MatrixXd j;
+    dense(evaluator, initial_values(model), Weighing{}, &r, &j);
+    // Some more information than the rows', so that no leverage comes near 1.
+    const Eigen::MatrixXd inverse = (2.0 * j.transpose() * j + Eigen::MatrixXd::Identity(j.cols(), j.cols())).inverse();
+    std::vector<std::int32_t> alone = every, some = every, many = every;
+    for (std::size_t row = 0; row < every.size(); ++row) {
+      some[row] = static_cast<std::int32_t>(row * 7 % 31);
+      many[row] = static_cast<std::int32_t>(row % 3);
+    }
+    CHECK(90 / 3 * components > static_cast<int>(free.size()));
+    for (const std::vector<std::int32_t>& cluster : {alone, some, many}) {
+      const Eigen::MatrixXd expected = few_scores_by_hand(j, r, components, inverse, cluster);
+      const Eigen::MatrixXd found = few_clusters_scores({model, table->data, bases, free, every, 1},
+                                                        initial_values(model), Weighing{}, inverse, cluster);
+      CHECK((found - expected).cwiseAbs().maxCoeff() < 1e-8 * expected.cwiseAbs().maxCoeff());
     }
   }
 }

@@ -400,6 +400,38 @@ TEST_CASE("standard errors take repeats of a pose for one observation where the 
   CHECK(ratio.mean() < 1.2);
 }
 
+TEST_CASE("standard errors of few poses match the scatter, also where some poses are off") {
+  // 21 parameters: fewer than two poses for each. Off is every fifth pose, by ten times the noise.
+  const int seeds = 200;
+  const Robot nominal = palletizer();
+  Robot truth = perturbed(nominal, 1e-3, 1e-3, 33);
+  truth.T_measurement_base = somewhere();
+  IdentifyOptions options;
+  options.test_share = 0.0;
+  options.loss = truing::Loss::none;
+  for (const std::size_t poses : {std::size_t{22}, std::size_t{30}}) {
+    for (const bool off : {false, true}) {
+      Scatter scatter;
+      for (unsigned seed = 0; seed < seeds; ++seed) {
+        auto table = random_joints(truth, poses, 34 + seed);
+        measure(table.get(), truth, What::position, 5e-5, 5000 + seed);
+        truing::math::Random random(6000 + seed);
+        for (std::size_t k = 0; k < 3; ++k) {
+          std::vector<double> position;
+          for (std::size_t i = 0; i < poses; ++i)
+            position.push_back(table->data.position[k][i] + (off && i % 5 == 0 ? 5e-4 * random.normal() : 0.0));
+          table->data.position[k] = table->add(position);
+        }
+        scatter.add(truing::identify(nominal, table->data, options));
+      }
+      const Eigen::ArrayXd ratio = scatter.ratio();
+      CHECK(ratio.mean() == doctest::Approx(1.0).scale(0).epsilon(0.07));
+      CHECK(ratio.minCoeff() > 0.8);
+      CHECK(ratio.maxCoeff() < 1.2);
+    }
+  }
+}
+
 TEST_CASE("standard errors of poses match the scatter, whatever weight rotations are given") {
   const int seeds = 200;
   const Robot nominal = rail_arm();
