@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Standard errors of real robots' parameters against what half-samples scatter by.
 
-    python bench/half_samples.py [--data FOLDER] [--splits 8] [--seed 5]
+    python bench/half_samples.py [--data FOLDER] [--splits 8] [--seed 5] [--only WORD] [--rank-tolerance 1e-6]
 
 The poses of each recording are parted in two halves at random, repeats of a pose together, and `identify`
 is run on either. Two fits to different poses differ by sqrt(s1^2 + s2^2) where their standard errors s1, s2
@@ -37,12 +37,17 @@ def seen(found: Identification) -> list[Any]:
     return [p for p in found.parameters if not p.frozen and p.sigma > 0.0]
 
 
-def ratios(robot: truing.Robot, data: truing.Measurements, splits: int, seed: int) -> NDArray[np.float64]:
-    """Differences of two halves' parameters over the standard errors of these."""
+def ratios(
+    robot: truing.Robot, data: truing.Measurements, splits: int, seed: int, **options: Any
+) -> NDArray[np.float64]:
+    """Differences of two halves' parameters over the standard errors of these; options: of `identify`."""
     group, out = poses_of(data), []
     for number in range(splits):
         one = parted(group, len(group) // 2, number, seed)
-        halves = [{p.name: p for p in seen(fit(robot, data.replace(set=half)))} for half in (one, 1 - one)]
+        halves = [
+            {p.name: p for p in seen(fit(robot, data.replace(set=half), **options))}
+            for half in (one, 1 - one)
+        ]
         for name in halves[0].keys() & halves[1].keys():
             a, b = halves[0][name], halves[1][name]
             out.append((a.value - b.value) / np.hypot(a.sigma, b.sigma))
@@ -54,16 +59,22 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=default_folder())
     parser.add_argument("--splits", type=int, default=8)
     parser.add_argument("--seed", type=int, default=5)
+    parser.add_argument("--only", default="", help="recordings with this word in their name")
+    parser.add_argument("--rank-tolerance", type=float, default=1e-6, help="of identify")
     arguments = parser.parse_args()
     print("| set | poses | rms | by the median |\n| --- | --- | --- | --- |")
     for recording in (*RECORDINGS, *ARMS):
+        if arguments.only not in recording.name:
+            continue
         if not (arguments.data / recording.folder).is_dir():
             print(f"{recording.name}: not there", file=sys.stderr)
             continue
         robot, data = load(arguments.data, recording)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of columns that every fit would say again
-            found = ratios(robot, data, arguments.splits, arguments.seed)
+            found = ratios(
+                robot, data, arguments.splits, arguments.seed, rank_tolerance=arguments.rank_tolerance
+            )
         poses = len(np.unique(poses_of(data)))
         rms, median = np.sqrt(np.mean(found**2)), np.median(np.abs(found)) / NORMAL
         print(f"| {recording.name} | {poses} | {rms:.2f} | {median:.2f} |", flush=True)

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -394,13 +393,117 @@ Seen what_is_seen(const Job& job, const Asked& asked, const Eigen::VectorXd& val
   return out;
 }
 
+/// Comparable lengths of the training rows' residuals at these values.
+std::vector<double> lengths_at(const Job& job, const Evaluator& all, const Eigen::VectorXd& values) {
+  Weighing weighing;
+  weighing.rotation_scale = job.options.rotation_length;
+  std::vector<double> norms(job.data.rows, 0.0);
+  all.residual_norms(values, weighing, &norms);
+  return comparable_lengths(job, norms);
+}
+
+/// Squares of the training rows, those longer than `bound` at their bound.
+double bounded_squares(const Job& job, const std::vector<double>& lengths, double bound) {
+  double out = 0.0;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const double median = kChiMedian[components_of(job.data, static_cast<std::size_t>(job.rows[i]))];
+    out += std::pow(std::min(lengths[i], bound) * median, 2.0);
+  }
+  return out;
+}
+
+/// Directions that the rows hardly see: there the floor of the cost may bend within a standard error, so that noise
+/// decides into which of its hollows a fit descends (what bends is the parameters' curvature of Bates and Watts,
+/// J. Royal Statistical Society B 42 (1980) 1). Places beyond the bends; none where the floor is straight.
+std::vector<Eigen::VectorXd> beyond_bends(const Job& job, const Fit& found) {
+  constexpr int kWeakest = 2;
+  constexpr int kPowers = 20;       // a direction need not be exact
+  constexpr double kBent = 10.0;    // times as high as the columns promise
+  constexpr double kBeyond = 16.0;  // standard errors
+  const std::vector<std::int32_t> rows = without(job.rows, found.rejected);
+  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, rows), found.fitted,
+                            job.options.threads);
+  Weighing plain;
+  plain.rotation_scale = job.options.rotation_length;
+  NormalEquations here;
+  evaluator.normal_equations(found.values, plain, &here);
+  const Eigen::Index p = here.gram.rows();
+  const double variance = here.squares / (static_cast<double>(here.components) - static_cast<double>(p));
+  if (p == 0 || !(variance > 0.0)) return {};
+  const Eigen::VectorXd scale = math::unit_scale<Eigen::Dynamic>(here.gram);
+  Eigen::MatrixXd inverse =
+      math::scaled_both<Eigen::Dynamic>(scale.cwiseInverse(), math::inverse_of(here.gram));  // of unit columns
+  const auto moved = [&](const Eigen::VectorXd& step) {
+    Eigen::VectorXd values = found.values;
+    for (Eigen::Index i = 0; i < p; ++i) values[found.fitted[static_cast<std::size_t>(i)]] += step[i];
+    return values;
+  };
+  std::vector<double> norms(job.data.rows, 0.0);
+  const auto squares_at = [&](const Eigen::VectorXd& values) {
+    evaluator.residual_norms(values, plain, &norms);
+    return std::accumulate(rows.begin(), rows.end(), 0.0, [&](double sum, std::int32_t row) {
+      return sum + std::pow(norms[static_cast<std::size_t>(row)], 2.0);
+    });
+  };
+  std::vector<Eigen::VectorXd> out;
+  for (int k = 0; k < kWeakest; ++k) {
+    Eigen::VectorXd weakest = Eigen::VectorXd::Ones(p);
+    for (int i = 0; i < kPowers; ++i) weakest = (inverse * weakest).normalized();
+    const double length = weakest.dot(inverse * weakest);
+    if (!(length > 0.0)) break;
+    inverse -= length * weakest * weakest.transpose();
+    const Eigen::VectorXd step = std::sqrt(variance * length) * scale.cwiseProduct(weakest);
+    // A standard error costs one variance where the floor is straight.
+    const double rise = 0.5 * (squares_at(moved(step)) + squares_at(moved(-step))) - here.squares;
+    if (!(rise > kBent * variance)) break;
+    out.push_back(moved(-kBeyond * step));
+    out.push_back(moved(kBeyond * step));
+  }
+  return out;
+}
+
+/// The deepest of the hollows in which fits end. Nobody looks for others where priors or bounds hold what is hardly
+/// seen.
+Fit deepest_fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start) {
+  constexpr int kMostRounds = 3;
+  constexpr int kMostSteps = 1000;
+  constexpr double kDeeper = 10.0;  // values' variances: exp(5) times as likely
+  Fit best = fit(job, fitted, start);
+  if (!best.solver.converged || !job.options.priors.empty() || !job.options.bounds.empty()) return best;
+  std::vector<Eigen::VectorXd> places = beyond_bends(job, best);
+  if (places.empty()) return best;
+  const Evaluator all(job.model, job.data, job.bases, make_segments(job.data, job.rows), fitted, job.options.threads);
+  IdentifyOptions options = job.options;
+  options.max_iterations = std::min(options.max_iterations, kMostSteps);
+  const Job quick{job.model, job.data, job.bases, options, job.rows};
+  const std::vector<double> first = lengths_at(job, all, best.values);
+  const double bound = job.options.loss == Loss::none ? std::numeric_limits<double>::infinity()
+                                                      : job.options.reject_beyond * median_of(first);
+  const double deeper = 1.0 - kDeeper / static_cast<double>(all.components());
+  double squares = bounded_squares(job, first, bound);
+  for (int round = 0; round < kMostRounds && !places.empty(); ++round) {
+    const double before = squares;
+    for (const Eigen::VectorXd& place : places) {
+      Fit other = fit(quick, fitted, place);
+      const double found = bounded_squares(job, lengths_at(job, all, other.values), bound);
+      if (!(found < squares && found < deeper * before)) continue;
+      squares = found;
+      best = std::move(other);
+    }
+    if (squares == before) break;
+    if (!best.solver.converged) best = fit(job, fitted, best.values);
+    places = beyond_bends(job, best);
+  }
+  return best;
+}
+
 /// The fit; gravity torques are taken from the robot as found until they no longer change. `bases` are the job's.
 Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start,
                      std::vector<std::vector<double>>* bases) {
   constexpr int kRounds = 5;
   constexpr double kUnchanged = 1e-11;
   const auto needs_gravity = [](const Term& term) { return term.needs_gravity; };
-  Fit found = fit(job, fitted, start);
+  Fit found = deepest_fit(job, fitted, start);
   if (!std::any_of(job.model.terms.begin(), job.model.terms.end(), needs_gravity)) return found;
   for (int round = 0; round < kRounds; ++round) {
     const Robot robot = robot_with(job.model, found.values);
@@ -722,7 +825,7 @@ std::optional<Eigen::MatrixXd> clustered_by_pose(const FittedRows& fitted, const
 }
 
 /// From so many poses a parameter on, none decides much of the fit: the leverage of each one's mean will do.
-constexpr std::size_t kManyPosesPerParameter = 10;
+constexpr std::size_t kManyPosesPerParameter = 5;
 
 /// Covariance of few poses, clustered, with the whole leverage of each. Their scores span as many directions as there
 /// are poses. What lacks to two poses a parameter is `plain` in their place, s^2 H^-1 or the like, as large as theirs
