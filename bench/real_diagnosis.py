@@ -5,6 +5,7 @@ docs/benchmarks/real-diagnosis.md.
 
     python bench/real_diagnosis.py [--data FOLDER]
     python bench/real_diagnosis.py --splits 10 --json AFTER.json [--before BEFORE.json] [--only WORD]
+    python bench/real_diagnosis.py --splits 10 --after AFTER.json ... --before BEFORE.json ... --write
 
 FOLDER as for bench/real_data.py. Without --splits every figure is of the rows that the recording itself holds
 out.
@@ -12,7 +13,9 @@ out.
 With --splits each recording is parted so many times at random (--seed), with as many rows held out as it
 holds out itself; the rows of one pose stay together. Printed are mean and worst rms error on held-out
 rows, and --json stores those of every split. With --before, what another build stored for the same splits
-stands beside. One split is luck: what changes a figure by less than its splits differ has changed
+stands beside; with --after, what was stored is not diagnosed again; --write puts the table into the page.
+Both take one file, or several with some recordings each. An older build stores its own by running this file
+with its interpreter. One split is luck: what changes a figure by less than its splits differ has changed
 nothing.
 """
 
@@ -209,23 +212,27 @@ def split_table(after: Mapping[str, list[Split]], before: Mapping[str, list[Spli
     return lines
 
 
-def stored(file: Path, seed: int, splits: int, names: Sequence[str]) -> dict[str, list[Split]]:
-    """What another build found for the same splits; ends the program if it is of others."""
-    try:
-        told = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise SystemExit(f"{file}: cannot be read: {error}") from None
-    wanted = {"format": FORMAT, "seed": seed, "splits": splits}
-    for name, value in wanted.items():
-        if not isinstance(told, dict) or told.get(name) != value:
-            raise SystemExit(
-                f"{file}: expected {name} {value}: store it by --splits {splits} --seed {seed} --json"
-            )
-    absent = [name for name in names if name not in told["recordings"]]
+def stored(files: Sequence[Path], seed: int, splits: int, names: Sequence[str]) -> dict[str, list[Split]]:
+    """What a build found for these splits of these recordings, in one file or several; ends the program if it
+    is of others.
+    """
+    found: dict[str, list[Split]] = {}
+    for file in files:
+        try:
+            told = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise SystemExit(f"{file}: cannot be read: {error}") from None
+        wanted = {"format": FORMAT, "seed": seed, "splits": splits}
+        for name, value in wanted.items():
+            if not isinstance(told, dict) or told.get(name) != value:
+                raise SystemExit(
+                    f"{file}: expected {name} {value}: store it by --splits {splits} --seed {seed} --json"
+                )
+        found.update(told["recordings"])
+    absent = [name for name in names if name not in found]
     if absent:
-        raise SystemExit(f"{file}: has no {absent[0]}: store it with all recordings that are compared")
-    found: dict[str, list[Split]] = told["recordings"]
-    return found
+        raise SystemExit(f"{files[0]}: has no {absent[0]}: store it with all recordings that are compared")
+    return {name: found[name] for name in names}
 
 
 def judge_splits(arguments: argparse.Namespace) -> None:
@@ -238,11 +245,24 @@ def judge_splits(arguments: argparse.Namespace) -> None:
     before = None
     if arguments.before:
         before = stored(arguments.before, arguments.seed, arguments.splits, names)
-    after = {one.name: splits_of(arguments.data, one, arguments.splits, arguments.seed) for one in chosen}
+    if arguments.after:
+        after = stored(arguments.after, arguments.seed, arguments.splits, names)
+    else:
+        after = {one.name: splits_of(arguments.data, one, arguments.splits, arguments.seed) for one in chosen}
     if arguments.json:
         told = {"format": FORMAT, "seed": arguments.seed, "splits": arguments.splits, "recordings": after}
         arguments.json.write_text(json.dumps(told, indent=1), encoding="utf-8")
-    print("\n".join(split_table(after, before)))
+    table = "\n".join(split_table(after, before))
+    print(table)
+    if arguments.write:
+        write(arguments.out, "<!-- splits -->", "<!-- end of splits -->", table)
+
+
+def write(page: Path, start: str, end: str, table: str) -> None:
+    """Puts the table between two marks of a page."""
+    text = page.read_text(encoding="utf-8")
+    first, last = text.index(start) + len(start), text.index(end)
+    page.write_text(text[:first] + "\n" + table + "\n" + text[last:], encoding="utf-8")
 
 
 def main() -> None:
@@ -255,18 +275,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the splits")
     parser.add_argument("--only", default="", help="recordings with this word in their name")
     parser.add_argument("--json", type=Path, help="where the errors of every split go")
-    parser.add_argument("--before", type=Path, help="what --json wrote by another build")
+    parser.add_argument("--before", type=Path, nargs="+", help="what --json wrote by another build")
+    parser.add_argument("--after", type=Path, nargs="+", help="what --json wrote: nothing is diagnosed")
+    parser.add_argument("--write", action="store_true", help="puts the table of the splits into the page")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
-    if arguments.splits < 1 and (arguments.json or arguments.before or arguments.only or arguments.seed):
-        parser.error("--json, --before, --only and --seed are of --splits")
+    of_splits = ("json", "before", "after", "write", "only", "seed")
+    if arguments.splits < 1 and any(getattr(arguments, name) for name in of_splits):
+        parser.error("--json, --before, --after, --write, --only and --seed are of --splits")
     if arguments.splits >= 1:
         judge_splits(arguments)
         return
-    table = "\n".join(rows(arguments.data))
-    page = arguments.out.read_text(encoding="utf-8")
-    start, end = page.index("<!-- table -->") + len("<!-- table -->"), page.index("<!-- end -->")
-    arguments.out.write_text(page[:start] + "\n" + table + "\n" + page[end:], encoding="utf-8")
+    write(arguments.out, "<!-- table -->", "<!-- end -->", "\n".join(rows(arguments.data)))
 
 
 if __name__ == "__main__":

@@ -64,7 +64,22 @@ def test_figures_of_other_splits_are_refused(tmp_path: Path, change: dict[str, A
     file = tmp_path / "before.json"
     told = {"format": real_diagnosis.FORMAT, "seed": 0, "splits": 2, "recordings": {"arm": [split(0.4)] * 2}}
     file.write_text(json.dumps(told))
-    assert real_diagnosis.stored(file, 0, 2, ["arm"])["arm"][0]["named"] == 0.4
+    assert real_diagnosis.stored([file], 0, 2, ["arm"])["arm"][0]["named"] == 0.4
     file.write_text(json.dumps({**told, **change}))
     with pytest.raises(SystemExit, match=said):
-        real_diagnosis.stored(file, 0, 2, ["arm"])
+        real_diagnosis.stored([file], 0, 2, ["arm"])
+
+
+def test_figures_stored_one_recording_a_file_are_taken_together(tmp_path: Path) -> None:
+    for name in ("arm", "leg"):
+        told = {"format": real_diagnosis.FORMAT, "seed": 0, "splits": 1, "recordings": {name: [split(0.4)]}}
+        (tmp_path / name).write_text(json.dumps(told))
+    found = real_diagnosis.stored([tmp_path / "leg", tmp_path / "arm"], 0, 1, ["arm", "leg"])
+    assert list(found) == ["arm", "leg"]
+
+
+def test_a_table_replaces_what_stands_between_its_marks_alone(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("a\n<!-- splits -->\nold\n<!-- end of splits -->\nb\n")
+    real_diagnosis.write(page, "<!-- splits -->", "<!-- end of splits -->", "| new |")
+    assert page.read_text() == "a\n<!-- splits -->\n| new |\n<!-- end of splits -->\nb\n"
