@@ -462,37 +462,73 @@ std::vector<Eigen::VectorXd> beyond_bends(const Job& job, const Fit& found) {
   return out;
 }
 
-/// The deepest of the hollows in which fits end. Nobody looks for others where priors or bounds hold what is hardly
-/// seen.
+/// At most so many rows, evenly taken, are enough to start from.
+constexpr std::size_t kStartRows = 4096;
+
+std::vector<std::int32_t> evenly(const std::vector<std::int32_t>& rows) {
+  std::vector<std::int32_t> out;
+  const std::size_t step = (rows.size() + kStartRows - 1) / kStartRows;
+  for (std::size_t i = 0; i < rows.size(); i += step) out.push_back(rows[i]);
+  return out;
+}
+
+/// How deep fits end, against one of them: rows beyond what that one rejects count as that.
+class Depth {
+ public:
+  Depth(const Job& job, const Fit& of)
+      : job_(job),
+        all_(job.model, job.data, job.bases, make_segments(job.data, job.rows), of.fitted, job.options.threads) {
+    const std::vector<double> lengths = lengths_at(job, all_, of.values);
+    if (job.options.loss != Loss::none) bound_ = job.options.reject_beyond * median_of(lengths);
+    here_ = bounded_squares(job, lengths, bound_);
+  }
+
+  double here() const { return here_; }
+  double at(const Fit& other) const { return bounded_squares(job_, lengths_at(job_, all_, other.values), bound_); }
+  std::size_t values() const { return all_.components(); }
+
+ private:
+  const Job& job_;
+  Evaluator all_;
+  double bound_ = std::numeric_limits<double>::infinity(), here_ = 0.0;
+};
+
+/// The deepest of the hollows in which fits to these rows end that start beyond the bends of one's floor; none if that
+/// one is.
+std::optional<Fit> deeper_fit(const Job& job, const Fit& here) {
+  constexpr double kDeeper = 10.0;  // values' variances: exp(5) times as likely
+  const std::vector<Eigen::VectorXd> places = beyond_bends(job, here);
+  if (places.empty()) return std::nullopt;
+  const Depth depth(job, here);
+  double least = depth.here() * (1.0 - kDeeper / static_cast<double>(depth.values()));
+  std::optional<Fit> deepest;
+  for (const Eigen::VectorXd& place : places) {
+    Fit other = fit(job, here.fitted, place);
+    const double squares = depth.at(other);
+    if (!(squares < least)) continue;
+    least = squares;
+    deepest = std::move(other);
+  }
+  return deepest;
+}
+
+/// The fit in the deepest of its hollows. Nobody looks for others where priors or bounds hold what is hardly seen.
 Fit deepest_fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start) {
   constexpr int kMostRounds = 3;
   constexpr int kMostSteps = 1000;
-  constexpr double kDeeper = 10.0;  // values' variances: exp(5) times as likely
   Fit best = fit(job, fitted, start);
   if (!best.solver.converged || !job.options.priors.empty() || !job.options.bounds.empty()) return best;
-  std::vector<Eigen::VectorXd> places = beyond_bends(job, best);
-  if (places.empty()) return best;
-  const Evaluator all(job.model, job.data, job.bases, make_segments(job.data, job.rows), fitted, job.options.threads);
   IdentifyOptions options = job.options;
   options.max_iterations = std::min(options.max_iterations, kMostSteps);
-  const Job quick{job.model, job.data, job.bases, options, job.rows};
-  const std::vector<double> first = lengths_at(job, all, best.values);
-  const double bound = job.options.loss == Loss::none ? std::numeric_limits<double>::infinity()
-                                                      : job.options.reject_beyond * median_of(first);
-  const double deeper = 1.0 - kDeeper / static_cast<double>(all.components());
-  double squares = bounded_squares(job, first, bound);
-  for (int round = 0; round < kMostRounds && !places.empty(); ++round) {
-    const double before = squares;
-    for (const Eigen::VectorXd& place : places) {
-      Fit other = fit(quick, fitted, place);
-      const double found = bounded_squares(job, lengths_at(job, all, other.values), bound);
-      if (!(found < squares && found < deeper * before)) continue;
-      squares = found;
-      best = std::move(other);
-    }
-    if (squares == before) break;
-    if (!best.solver.converged) best = fit(job, fitted, best.values);
-    places = beyond_bends(job, best);
+  const Job some{job.model, job.data, job.bases, options, evenly(job.rows)};
+  const bool all = some.rows.size() == job.rows.size();
+  for (int round = 0; round < kMostRounds; ++round) {
+    if (!all && beyond_bends(job, best).empty()) break;
+    const std::optional<Fit> deeper = deeper_fit(some, all ? best : fit(some, fitted, best.values));
+    if (!deeper) break;
+    Fit other = all && deeper->solver.converged ? *deeper : fit(job, fitted, deeper->values);
+    if (!all && !(Depth(job, best).at(other) < Depth(job, best).here())) break;
+    best = std::move(other);
   }
   return best;
 }
@@ -520,9 +556,6 @@ Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen
 
 // --- where to start --------------------------------------------------------------------------------------------------
 
-/// At most so many rows, evenly taken, are enough to start from.
-constexpr std::size_t kStartRows = 4096;
-
 struct Predicted {
   std::size_t row;
   Eigen::Isometry3d frame;
@@ -533,9 +566,8 @@ template <typename Wanted>
 std::vector<Predicted> predict_some(const Robot& robot, const Job& job, const Wanted& wanted) {
   const Model model = make_model(robot, job.data, job.options.effects, job.options.own_effects);
   std::vector<std::int32_t> rows;
-  const std::size_t step = (job.rows.size() + kStartRows - 1) / kStartRows;
-  for (std::size_t i = 0; i < job.rows.size(); i += step) {
-    if (wanted(static_cast<std::size_t>(job.rows[i]))) rows.push_back(job.rows[i]);
+  for (const std::int32_t row : evenly(job.rows)) {
+    if (wanted(static_cast<std::size_t>(row))) rows.push_back(row);
   }
   const Evaluator evaluator(model, job.data, job.bases, make_segments(job.data, rows, true), {}, 1);
   std::vector<Predicted> out;
