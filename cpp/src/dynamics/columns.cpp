@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -19,12 +20,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Columns of the design that a joint's torque has.
-std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, std::size_t joints) {
+/// Those of some columns of the design that a joint's torque has.
+std::vector<std::vector<int>> columns_by_joint(const TorqueDesign& design, const std::vector<int>& columns,
+                                               std::size_t joints) {
   std::vector<std::vector<int>> out(joints);
-  for (std::size_t c = 0; c < design.terms.size(); ++c) {
-    for (const std::size_t j : design.terms[c].joints) out[j].push_back(static_cast<int>(c));
+  for (const int c : columns) {
+    for (const std::size_t j : design.terms[static_cast<std::size_t>(c)].joints) out[j].push_back(c);
   }
+  return out;
+}
+
+std::vector<int> all_columns(const TorqueDesign& design) {
+  std::vector<int> out(design.terms.size());
+  std::iota(out.begin(), out.end(), 0);
   return out;
 }
 
@@ -136,17 +144,22 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
 }  // namespace
 
 DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
+    : DesignColumns(tiles, design, all_columns(design)) {}
+
+DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns)
     : tiles_(tiles),
       design_(design),
       chain_(tiles.robot()),
-      by_joint_(columns_by_joint(design, tiles.robot().driven_count())) {
+      columns_(std::move(columns)),
+      by_joint_(columns_by_joint(design, columns_, tiles.robot().driven_count())) {
   constexpr double kMostKept = 400.0 * 1024 * 1024;  ///< [bytes]
   double numbers = 0.0;
-  for (const std::vector<int>& columns : by_joint_) numbers += static_cast<double>(columns.size() + 1);
+  for (const std::vector<int>& mine : by_joint_) numbers += static_cast<double>(mine.size() + 1);
   const Index rows = tiles.kept_rows();
   if (rows >= 0 && sizeof(double) * numbers * static_cast<double>(rows) < kMostKept) kept_.resize(tiles.kept_tiles());
   stale_.resize(kept_.size(), 0);
-  for (const TorqueTerm& term : design.terms) {
+  for (const int c : columns_) {
+    const TorqueTerm& term = design.terms[static_cast<std::size_t>(c)];
     needs_rigid_ = needs_rigid_ || (term.link_parameter < 0 && term.needs_rigid);
     needs_torque_ = needs_torque_ || term.needs_torque;
     needs_inertia_ = needs_inertia_ || term.needs_inertia;
@@ -165,7 +178,8 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)
   std::vector<MatrixXd> made;
   std::vector<Index> next(by_joint_.size(), 0);
   std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place
-  for (const TorqueTerm& term : design_.terms) {
+  for (const int c : columns_) {
+    const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
     const bool of_link = term.link_parameter >= 0, now = wanted(term);
     const auto same = term.column.empty() ? made_already.end() : made_already.find(term.column);
     const bool copied = same != made_already.end();

@@ -20,6 +20,8 @@ class DesignColumns {
 
   /// Both must outlive it.
   DesignColumns(const Tiles& tiles, const TorqueDesign& design);
+  /// Of some columns of the design alone, ascending numbers.
+  DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns);
 
   const Tiles& tiles() const { return tiles_; }
   const TorqueDesign& design() const { return design_; }
@@ -27,7 +29,7 @@ class DesignColumns {
   bool are_kept() const { return !kept_.empty(); }
   /// Some of the columns ask for the torque of a model.
   bool any_needs_torque() const { return needs_torque_; }
-  /// Numbers of the design's columns that a joint's torque has, ascending.
+  /// Numbers of the design's columns that a joint's torque has here, ascending.
   const std::vector<int>& of_joint(std::size_t joint) const { return by_joint_[joint]; }
 
   /// Calls use(tables) of a tile. Columns that need a torque are there if `with_torque`, by Motion::torque.
@@ -43,6 +45,7 @@ class DesignColumns {
   const Tiles& tiles_;
   const TorqueDesign& design_;
   RigidChain chain_;
+  std::vector<int> columns_;  ///< ascending
   std::vector<std::vector<int>> by_joint_;
   bool needs_rigid_ = false, needs_torque_ = false, needs_inertia_ = false;
   mutable std::vector<Tables> kept_;  ///< by tile; empty: not yet made

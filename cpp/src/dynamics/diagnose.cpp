@@ -61,10 +61,23 @@ TorqueDesign whole_design(const Problem& problem, const TorqueDiagnoseOptions& o
   return out;
 }
 
-/// Of held-out recordings: how much a fold counts was found for those that are fitted.
-std::vector<Noise> of_held_out(std::vector<Noise> noise) {
+/// Sums of held-out recordings, of what an account chose and of what is always in: a search looks at hundreds of
+/// columns, its answer has few. How much a fold counts was found for those that are fitted. `seen`: the model whose
+/// torque some terms need.
+std::vector<FoldGram> held_out_of(const Problem& problem, const Account& account, const TorqueModel& seen,
+                                  std::vector<Noise> noise) {
   for (Noise& one : noise) one.weight_of_fold.resize(0);
-  return noise;
+  std::vector<int> columns = account.search->evidence().nuisance();
+  for (const int g : account.choice.groups) {
+    const std::vector<int>& more = account.design->groups[static_cast<std::size_t>(g)].columns;
+    columns.insert(columns.end(), more.begin(), more.end());
+  }
+  std::sort(columns.begin(), columns.end());
+  const DesignColumns chosen(problem.tiles, *account.design, std::move(columns));
+  const TorqueGrams grams = sum_grams(chosen, problem.nominal, seen, problem.test);
+  std::vector<FoldGram> out;
+  for (int f = 0; f < problem.test.count; ++f) out.emplace_back(grams, static_cast<std::size_t>(f), noise);
+  return out;
 }
 
 /// The columns that are always in, and the terms of a choice; `choice` becomes that of the part.
@@ -211,30 +224,32 @@ bool as_good_as_free(const Account& given, const Account& free) {
 
 // The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
 // well as inertias that are all free, it says more with less. What free inertias take up is named here.
+// `seen`: the model of the free ones.
 std::optional<Account> of_given_inertias(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
-                                         const TorqueGrams& grams_held_out, const std::vector<Noise>& noise,
-                                         const Account& free, const SearchLimits& limits) {
+                                         const TorqueModel& seen, const std::vector<Noise>& noise, const Account& free,
+                                         const SearchLimits& limits) {
   SearchLimits more = limits;
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
   more.masses_given = true;
-  const auto searched = [&](const TorqueGrams& train, const TorqueGrams& test, const Choice& start) {
+  const auto searched = [&](const TorqueGrams& train, const Choice& start) {
     const std::vector<bool> none(free.design->terms.size(), false);
-    Account out = account_of(free.design, sums_of(train, noise, *free.design, none),
-                             sums_of(test, of_held_out(noise), *free.design, none), friction_columns(*free.design));
+    Account out =
+        account_of(free.design, sums_of(train, noise, *free.design, none), friction_columns(*free.design));
     out.choice = out.search->run(start, more, false);
     out.inertias_given = true;
     return out;
   };
-  Account out = searched(grams, grams_held_out, free.choice);
+  Account out = searched(grams, free.choice);
+  TorqueModel model = seen;
   if (has_constant_of_drive(out)) {
     // Free inertias take a drive's constant up, and its column with it: now it is the torque that the file's give.
-    const TorqueModel model = fitted_model(problem, out);
-    out = searched(sum_grams(columns, problem.nominal, model, problem.train),
-                   sum_grams(columns, problem.nominal, model, problem.test), out.choice);
+    model = fitted_model(problem, out);
+    out = searched(sum_grams(columns, problem.nominal, model, problem.train), out.choice);
   }
   out.choice = without_what_hides(out);
   if (!as_good_as_free(out, free)) return {};
   if (!bodies_can_do_it(problem, out)) return {};
+  out.held_out = held_out_of(problem, out, model, noise);
   return out;
 }
 
@@ -260,14 +275,12 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   *noise = noise_of_all(problem, columns, grams, *noise);
   std::vector<bool> priors = inertial_columns(*design);
   if (problem.fitted_before || of_effects.inertias_given) priors.assign(priors.size(), false);
-  const TorqueGrams held_out = sum_grams(columns, problem.nominal, model, problem.test);
-  Account out =
-      account_of(design, sums_of(grams, *noise, *design, priors),
-                 sums_of(held_out, of_held_out(*noise), *design, std::vector<bool>(priors.size(), false)), nuisance);
+  Account out = account_of(design, sums_of(grams, *noise, *design, priors), nuisance);
   SearchLimits of_functions = limits;
   of_functions.least_gain = std::max(kLeastGainOfFunctions, limits.least_gain);
   of_functions.most = static_cast<int>(choice.groups.size()) + kMostFunctions;
   out.choice = out.search->run(choice, of_functions, true);
+  out.held_out = held_out_of(problem, out, model, *noise);
   out.choice = without_functions_that_fail(out, of_functions.least_gain);
   out.inertias_given = of_effects.inertias_given;
   return out;
@@ -320,10 +333,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     model = fitted_model(problem, *design, sums, search, choice);
     if (round + 2 >= kRounds) noise = noise_of(problem.tiles, model, problem.train);
   }
-  const TorqueGrams held_out = sum_grams(*columns, problem.nominal, model, problem.test);
-  Account free = account_of(
-      design, sums_of(grams, noise, *design, priors),
-      sums_of(held_out, of_held_out(noise), *design, std::vector<bool>(design->terms.size(), false)), nuisance);
+  Account free = account_of(design, sums_of(grams, noise, *design, priors), nuisance);
   free.choice = choice;
   free.choice = without_what_hides(free);
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {
@@ -332,12 +342,13 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     return named(problem, groundwork, account, noise, functions, noise_of_functions);
   };
   std::optional<Account> given;
-  if (!problem.fitted_before) given = of_given_inertias(problem, *columns, grams, held_out, noise, free, limits);
+  if (!problem.fitted_before) given = of_given_inertias(problem, *columns, grams, model, noise, free, limits);
   columns.reset();  // large
   if (given) {
     TorqueDiagnosis out = answer(*given, fitted_model(problem, *given));
     if (out.verdict != Verdict::does_not_hold) return out;
   }
+  free.held_out = held_out_of(problem, free, model, noise);
   return answer(free, model);
 }
 

@@ -241,7 +241,7 @@ class Shares {
   VectorXd folds_and_held_out(const Choice& choice) const {
     const Evidence::State& state = account_.search->state(choice);
     const VectorXd& folds = account_.search->squares_of_folds(choice);
-    const std::vector<FoldGram>& held_out = account_.held_out->folds;
+    const std::vector<FoldGram>& held_out = account_.held_out;
     VectorXd out(folds.size() + static_cast<Index>(held_out.size()));
     out.head(folds.size()) = folds;
     for (std::size_t f = 0; f < held_out.size(); ++f)
@@ -698,13 +698,13 @@ namespace {
 double held_out_squares(const Account& account, const Choice& choice) {
   const Evidence::State& state = account.search->state(choice);
   double out = 0.0;
-  for (const FoldGram& fold : account.held_out->folds) out += Search::squares_on(fold, state);
+  for (const FoldGram& fold : account.held_out) out += Search::squares_on(fold, state);
   return out;
 }
 
 /// Whether held-out recordings hold anything of a group: a joint may rest in them.
 bool is_in_held_out(const Account& account, const TorqueGroup& group) {
-  return std::any_of(account.held_out->folds.begin(), account.held_out->folds.end(),
+  return std::any_of(account.held_out.begin(), account.held_out.end(),
                      [&](const FoldGram& fold) { return fold.of(group.columns).xx.trace() > 0.0; });
 }
 

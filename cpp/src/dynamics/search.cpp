@@ -290,11 +290,10 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
   return less_what_is_idle(std::move(choice), limits, free_functions);
 }
 
-Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, Sums held_out, std::vector<int> nuisance) {
+Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance) {
   Account out;
   out.design = std::move(design);
   out.sums = std::make_shared<const Sums>(std::move(sums));
-  out.held_out = std::make_shared<const Sums>(std::move(held_out));
   out.search = std::make_shared<const Search>(*out.design, *out.sums, std::move(nuisance));
   return out;
 }

@@ -119,11 +119,12 @@ class Search {
 /// A search with all that it stands on, and what it chose.
 struct Account {
   std::shared_ptr<const TorqueDesign> design;
-  std::shared_ptr<const Sums> sums, held_out;
+  std::shared_ptr<const Sums> sums;
   std::shared_ptr<const Search> search;
   Choice choice{};
-  bool inertias_given = false;  ///< links' inertias are the file's, but for those that were chosen
+  bool inertias_given = false;         ///< links' inertias are the file's, but for those that were chosen
+  std::vector<FoldGram> held_out = {}; ///< recordings that nothing was fitted to: of what was chosen alone
 };
-Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, Sums held_out, std::vector<int> nuisance);
+Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance);
 
 }  // namespace truing::dynamics
