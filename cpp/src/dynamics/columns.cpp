@@ -69,20 +69,31 @@ Index place_of(const RigidChain& chain, std::size_t joint, int parameter) {
   return kLinkParameters * static_cast<Index>(at) + parameter % kLinkParameters;
 }
 
-/// Normal equations of rows of a table, the measured value its last column.
+/// Of columns that are kept: it is another when friction turns otherwise.
+bool looks_at_direction(const TorqueTerm& term) {
+  return term.needs_direction && !term.needs_torque && term.link_parameter < 0;
+}
+
+/// Order in which the columns of a table are summed: first those whose products with each other are known.
+struct SumOrder {
+  std::vector<Index> columns;  ///< the measured value last
+  Index known = 0;
+};
+
+/// Normal equations of rows of a table, the measured value its last column. Known products are nought.
 class TableSum {
  public:
-  explicit TableSum(Index columns)
-      : rows_(kTogether, columns), sums_(kernel::functions().gram_size(static_cast<int>(columns)), 0.0) {}
-
-  Gram of(const MatrixXd& table, const std::vector<Index>& rows) {
+  Gram of(const MatrixXd& table, const std::vector<Index>& rows, const SumOrder& order) {
     const auto count = static_cast<Index>(rows.size());
+    const auto columns = static_cast<int>(table.cols());
+    rows_.resize(kTogether, std::max(rows_.cols(), table.cols()));
+    sums_.resize(std::max(sums_.size(), kernel::functions().gram_size(columns)), 0.0);
     for (Index done = 0; done < count; done += kTogether) {
       const Index some = std::min(kTogether, count - done), all = RigidChain::padded(some);
       const Index first = rows[static_cast<std::size_t>(done)];
       const bool in_a_row = rows[static_cast<std::size_t>(done + some - 1)] == first + some - 1;
       for (Index c = 0; c < table.cols(); ++c) {
-        const double* const from = table.col(c).data();
+        const double* const from = table.col(order.columns[static_cast<std::size_t>(c)]).data();
         double* const to = rows_.col(c).data();
         if (in_a_row)
           std::copy_n(from + first, some, to);
@@ -90,24 +101,37 @@ class TableSum {
           for (Index i = 0; i < some; ++i) to[i] = from[rows[static_cast<std::size_t>(done + i)]];
       }
       rows_.middleRows(some, all - some).setZero();
-      kernel::functions().gram_add(rows_.data(), kTogether, static_cast<int>(table.cols()), static_cast<int>(all),
-                                   sums_.data());
+      kernel::functions().gram_add(rows_.data(), kTogether, columns, static_cast<int>(order.known),
+                                   static_cast<int>(all), sums_.data());
     }
-    const Index x = table.cols() - 1;
-    MatrixXd sum = MatrixXd::Zero(x + 1, x + 1);
-    kernel::functions().gram_reduce(sums_.data(), static_cast<int>(x + 1), sum.data());
-    Gram out;
-    out.xx = sum.topLeftCorner(x, x).selfadjointView<Eigen::Upper>();
-    out.xy = sum.col(x).head(x);
-    out.yy = sum(x, x);
-    out.n = static_cast<double>(count);
-    return out;
+    products_.setZero(columns, columns);
+    kernel::functions().gram_reduce(sums_.data(), columns, products_.data());
+    return in_place(order, static_cast<double>(count));
   }
 
  private:
+  Gram in_place(const SumOrder& order, double count) const {
+    const Index x = products_.cols() - 1;
+    Gram out;
+    out.xx = MatrixXd::Zero(x, x);
+    out.xy = VectorXd::Zero(x);
+    for (Index b = order.known; b < x; ++b) {
+      const Index column = order.columns[static_cast<std::size_t>(b)];
+      for (Index a = 0; a <= b; ++a) {
+        const Index row = order.columns[static_cast<std::size_t>(a)];
+        out.xx(row, column) = out.xx(column, row) = products_(a, b);
+      }
+    }
+    for (Index a = 0; a < x; ++a) out.xy[order.columns[static_cast<std::size_t>(a)]] = products_(a, x);
+    out.yy = products_(x, x);
+    out.n = count;
+    return out;
+  }
+
   static constexpr Index kTogether = 256;
   MatrixXd rows_;
-  std::vector<double> sums_;  ///< the kernel's own
+  std::vector<double> sums_;  ///< the kernel's own: nought between two calls
+  MatrixXd products_;
 };
 
 /// Sums of one tile, by joint and fold.
@@ -126,16 +150,17 @@ std::vector<std::vector<Index>> fitted_rows(const Tile& tile, Index joint, const
   return out;
 }
 
-TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const MatrixXd& predicted, const Folds& folds) {
+TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const MatrixXd& predicted, const Folds& folds,
+                   const std::vector<SumOrder>& orders) {
+  thread_local TableSum sum;  // its room is large, and clearing pages takes long
   TileGrams out(columns->size(), std::vector<Gram>(static_cast<std::size_t>(folds.count)));
   for (std::size_t j = 0; j < columns->size(); ++j) {
     const auto joint = static_cast<Index>(j);
     MatrixXd& table = (*columns)[j];
     table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
-    TableSum sum(table.cols());
     const std::vector<std::vector<Index>> rows = fitted_rows(tile, joint, folds);
     for (std::size_t f = 0; f < rows.size(); ++f) {
-      if (!rows[f].empty()) out[j][f] = sum.of(table, rows[f]);
+      if (!rows[f].empty()) out[j][f] = sum.of(table, rows[f], orders[j]);
     }
   }
   return out;
@@ -211,8 +236,7 @@ void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(T
       tables.emplace_back(tile->count, static_cast<Index>(columns.size()) + 1);
     fill(tile, [](const TorqueTerm& term) { return !term.needs_torque; }, &tables);
   } else if (stale_[tile->number] != 0) {
-    const auto turns = [](const TorqueTerm& t) { return t.needs_direction && !t.needs_torque && t.link_parameter < 0; };
-    fill(tile, turns, &tables);
+    fill(tile, looks_at_direction, &tables);
   }
   if (!kept_.empty()) stale_[tile->number] = 0;
   if (with_torque && needs_torque_) fill(tile, [](const TorqueTerm& term) { return term.needs_torque; }, &tables);
@@ -221,11 +245,40 @@ void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(T
 
 void DesignColumns::turned() { std::fill(stale_.begin(), stale_.end(), 1); }
 
+namespace {
+
+/// Columns of a joint that are as they were, then the others.
+SumOrder order_of(const TorqueDesign& design, const std::vector<int>& columns, const EarlierSums& earlier) {
+  SumOrder out;
+  std::vector<Index> others;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const TorqueTerm& term = design.terms[static_cast<std::size_t>(columns[k])];
+    const bool known = earlier.grams && !term.needs_torque && !(earlier.turned && looks_at_direction(term));
+    (known ? out.columns : others).push_back(static_cast<Index>(k));
+  }
+  out.known = static_cast<Index>(out.columns.size());
+  others.push_back(static_cast<Index>(columns.size()));
+  out.columns.insert(out.columns.end(), others.begin(), others.end());
+  return out;
+}
+
+void add_known(const std::vector<Gram>& earlier, const SumOrder& order, std::vector<Gram>* folds) {
+  const std::vector<Index> known(order.columns.begin(), order.columns.begin() + order.known);
+  for (std::size_t f = 0; f < folds->size(); ++f) {
+    if ((*folds)[f].xx.size() > 0) (*folds)[f].xx(known, known) = earlier[f].xx(known, known);
+  }
+}
+
+}  // namespace
+
 TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                      const Folds& folds) {
+                      const Folds& folds, const EarlierSums& earlier) {
   auto out = std::make_shared<std::vector<JointGrams>>();
-  for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j)
+  std::vector<SumOrder> orders;
+  for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j) {
     out->push_back({columns.of_joint(j), std::vector<Gram>(static_cast<std::size_t>(folds.count))});
+    orders.push_back(order_of(columns.design(), columns.of_joint(j), earlier));
+  }
   std::vector<TileGrams> lot(Tiles::kTogether);
   const auto work = [&](Tile& tile, std::size_t k) {
     const MatrixXd predicted = kept_torque(subtracted, &tile);
@@ -234,7 +287,7 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
     else
       set_direction(seen.turns(), &tile);
     columns.use(&tile, true,
-                [&](DesignColumns::Tables& tables) { lot[k] = grams_of(&tables, tile, predicted, folds); });
+                [&](DesignColumns::Tables& tables) { lot[k] = grams_of(&tables, tile, predicted, folds, orders); });
   };
   const auto add = [&](std::size_t k) {
     for (std::size_t j = 0; j < out->size(); ++j) {
@@ -245,6 +298,8 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
     lot[k].clear();
   };
   columns.tiles().for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; }, work, add);
+  for (std::size_t j = 0; earlier.grams && j < out->size(); ++j)
+    add_known((*earlier.grams)[j].folds, orders[j], &(*out)[j].folds);
   return out;
 }
 

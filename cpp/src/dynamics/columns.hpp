@@ -57,10 +57,17 @@ class DesignColumns {
 std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const Eigen::VectorXd& values,
                            const Folds& folds);
 
+/// Sums of the same columns over the same folds, from before the torque that is seen became another, or friction
+/// turned otherwise (DesignColumns::turned): products of columns that ask for neither are as they were.
+struct EarlierSums {
+  TorqueGrams grams = nullptr;
+  bool turned = false;
+};
+
 /// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
 /// torque see that of `seen`.
 TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                      const Folds& folds);
+                      const Folds& folds, const EarlierSums& earlier = {});
 
 /// What the model and the columns times values leave; no column that has a value may need a torque.
 std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const Eigen::VectorXd& values,

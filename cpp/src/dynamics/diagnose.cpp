@@ -121,8 +121,8 @@ class Refit {
   /// Errors by joint with the turns that are set.
   std::vector<double> errors() {
     table_.turned();
-    const TorqueGrams grams = sum_grams(table_, problem_.nominal, seen_.turning(problem_.range.turns), problem_.train);
-    const Fit fit = fit_of(sums_of(grams, noise_, design_, inertial_columns(design_)), columns_);
+    grams_ = sum_grams(table_, problem_.nominal, seen_.turning(problem_.range.turns), problem_.train, {grams_, true});
+    const Fit fit = fit_of(sums_of(grams_, noise_, design_, inertial_columns(design_)), columns_);
     return rms_of(problem_, problem_.nominal.with(valued(design_, fit)));
   }
 
@@ -137,6 +137,7 @@ class Refit {
   TorqueDesign design_;
   DesignColumns table_;
   std::vector<int> columns_;
+  TorqueGrams grams_;  ///< with the turns before
 };
 
 bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
@@ -244,7 +245,7 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
   if (has_constant_of_drive(out)) {
     // Free inertias take a drive's constant up, and its column with it: now it is the torque that the file's give.
     model = fitted_model(problem, out);
-    out = searched(sum_grams(columns, problem.nominal, model, problem.train), out.choice);
+    out = searched(sum_grams(columns, problem.nominal, model, problem.train, {grams}), out.choice);
   }
   out.choice = without_what_hides(out);
   if (!as_good_as_free(out, free)) return {};
@@ -316,17 +317,19 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   // everything leaves, and only in the last round what the model found leaves.
   constexpr int kRounds = 3;
   for (int round = 0; round < kRounds; ++round) {
+    bool turned = false;
     if (round + 1 == kRounds && !problem.fitted_before) {
       const std::vector<FrictionTurn> before = problem.range.turns;
       Refit refit(problem, *design, choice, model, noise);
       choose_turns(&problem, [&] { return refit.errors(); });
-      if (!same(problem.range.turns, before)) {
+      turned = !same(problem.range.turns, before);
+      if (turned) {
         *design = whole_design(problem, options);  // of the same groups
         columns->turned();
         model = model.turning(problem.range.turns);
       }
     }
-    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train);
+    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train, {grams, turned});
     const Sums sums = sums_of(grams, noise, *design, priors);
     const Search search(*design, sums, nuisance);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);

@@ -137,6 +137,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   TorqueModel model = groundwork.model;
   std::vector<Noise> noise = groundwork.noise;
   std::vector<int> groups;
+  TorqueGrams grams;
   Sums sums;
   Fit fit;
   // Terms that need the torque see that of the model found in the round before. Beside the links' masses a drive's
@@ -144,7 +145,8 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   const bool scaled = scales_masses(design, options);
   const int rounds = scaled ? 6 : 2;
   for (int round = 0; round < rounds; ++round) {
-    sums = sums_of(sum_grams(columns, problem.nominal, model, problem.train), noise, design, with_prior);
+    grams = sum_grams(columns, problem.nominal, model, problem.train, {grams});
+    sums = sums_of(grams, noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
     model = problem.nominal.with(valued(design, fit));

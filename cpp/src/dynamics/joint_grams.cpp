@@ -66,7 +66,7 @@ class JointSums {
       complete(static_cast<Eigen::Index>(k), begin,
                JointRows(tile.data(), rows, tile.cols(), Eigen::OuterStride<>(kTile)));
       tile.middleRows(rows, all - rows).setZero();
-      kernel::functions().gram_add(tile.data(), kTile, static_cast<int>(tile.cols()), static_cast<int>(all),
+      kernel::functions().gram_add(tile.data(), kTile, static_cast<int>(tile.cols()), 0, static_cast<int>(all),
                                    sums_[k].data());
     }
     n_ += static_cast<double>(rows);

@@ -403,11 +403,13 @@ TorqueDesign standard_design(const Problem& problem) {
   return design;
 }
 
-/// `table`: of `design`.
-Groundwork fitted_groundwork(const Problem& problem, const TorqueDesign& design, const DesignColumns& table) {
+/// `table`: of `design`. `sums_before`: null, or its sums with the turns before; becomes those of now.
+Groundwork fitted_groundwork(const Problem& problem, const TorqueDesign& design, const DesignColumns& table,
+                             TorqueGrams* sums_before) {
   const std::vector<bool> with_prior = inertial_columns(design);
   const std::vector<int> columns = standard_columns(design);
-  const TorqueGrams grams = sum_grams(table, problem.nominal, problem.nominal, problem.train);
+  const TorqueGrams grams =
+      *sums_before = sum_grams(table, problem.nominal, problem.nominal, problem.train, {*sums_before, true});
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
@@ -623,15 +625,16 @@ Groundwork groundwork_of(Problem* problem) {
   }
   TorqueDesign design = standard_design(*problem);
   DesignColumns table(problem->tiles, design);
+  TorqueGrams grams;
   choose_turns(problem, [&] {
     design = standard_design(*problem);  // of the same columns
     table.turned();
-    const Groundwork groundwork = fitted_groundwork(*problem, design, table);
+    const Groundwork groundwork = fitted_groundwork(*problem, design, table, &grams);
     return rms_of(table, problem->nominal, by_column(design, groundwork.fit), problem->train);
   });
   design = standard_design(*problem);
   table.turned();
-  return fitted_groundwork(*problem, design, table);
+  return fitted_groundwork(*problem, design, table, &grams);
 }
 
 }  // namespace truing::dynamics

@@ -92,7 +92,7 @@ void add_products(Eigen::Index count, Scores* scores, std::vector<double>* sums)
   const Eigen::ArrayXd factor = (1.0 - scores->leverage.head(count).array().min(kMostLeverage)).rsqrt();
   scores->score.topRows(count).array().colwise() *= factor;
   const kernel::Functions& run = kernel::functions();
-  run.gram_add(scores->score.data(), scores->score.rows(), static_cast<int>(scores->score.cols()),
+  run.gram_add(scores->score.data(), scores->score.rows(), static_cast<int>(scores->score.cols()), 0,
                static_cast<int>(padded), sums->data());
 }
 

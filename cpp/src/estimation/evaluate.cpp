@@ -508,7 +508,7 @@ struct Evaluator::Impl {
       evaluate_tile(range, values, weighing, true, true, w);
       const int rows_per_pose = components_of(segments[range.segment].kind);
       const int columns = static_cast<int>(programs[range.segment].columns.size()) + 1;
-      run.gram_add(w->jacobian.get(), rows_per_pose * kTilePoses, columns, rows_per_pose * kTilePoses,
+      run.gram_add(w->jacobian.get(), rows_per_pose * kTilePoses, columns, 0, rows_per_pose * kTilePoses,
                    w->accumulator.get());
       if (weighing.loss != kernel::RowLoss::none) {
         for (int i = 0; i < range.count; ++i) sums.back() += loss_of(weighing, w->squared_norm.get()[i]);

@@ -129,7 +129,7 @@ void GramSum::push() {
 
 void GramSum::fold_in() {
   if (filled_ < kLength) buffer_.bottomRows(kLength - filled_).setZero();
-  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1),
+  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1), 0,
                                static_cast<int>((filled_ + 7) / 8 * 8), sums_.data());
   filled_ = 0;
 }

@@ -339,8 +339,9 @@ std::size_t gram_size(int columns) {
   return size;
 }
 
-void gram_add(const double* c, std::ptrdiff_t stride, int columns, int length, double* acc) {
+void gram_add(const double* c, std::ptrdiff_t stride, int columns, int known, int length, double* acc) {
   for_blocks(columns, [&](int i, int j, std::size_t at) {
+    if (j + kCols <= known) return;  // above the diagonal all of it is known
     const double* a[kRows];
     const double* b[kCols];
     // Beyond the last column the last one is read again; gram_reduce leaves those products out.
