@@ -125,7 +125,8 @@ void time_limit(Index rows) {
   const double time = best_seconds(40, [&] {
     for (Index first = 0; first < rows; first += kTile) {
       for (std::size_t k = 0; k < tiles.size(); ++k)
-        kernel::functions().gram_add(tiles[k].data(), kTile, static_cast<int>(tiles[k].cols()), 0, kTile, sums[k].data());
+        kernel::functions().gram_add(tiles[k].data(), kTile, static_cast<int>(tiles[k].cols()), 0, kTile,
+                                     sums[k].data());
     }
   });
   report("gram_only", static_cast<double>(rows) / time, "samples/s");

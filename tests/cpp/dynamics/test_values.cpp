@@ -76,3 +76,62 @@ TEST_CASE("columns kept while friction turns otherwise are those made anew") {
     CHECK((*before)[j].folds[0].xx != (*anew)[j].folds[0].xx);
   }
 }
+
+namespace {
+
+/// The model with a torque that it did not have.
+TorqueModel with_more(const TorqueModel& model, const TorqueDesign& design) {
+  for (const TorqueTerm& term : design.terms) {
+    if (term.link_parameter < 0 && !term.needs_torque) return model.with({{term, 0.3}});
+  }
+  return model;
+}
+
+void check_same(const TorqueGrams& some, const TorqueGrams& others) {
+  for (std::size_t j = 0; j < others->size(); ++j) {
+    for (std::size_t f = 0; f < (*others)[j].folds.size(); ++f) {
+      const Gram &a = (*some)[j].folds[f], &b = (*others)[j].folds[f];
+      CHECK(a.xx == b.xx);
+      CHECK(a.xy == b.xy);
+      CHECK(a.yy == b.yy);
+      CHECK(a.n == b.n);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("sums with what is known from before are those made anew, to the bit") {
+  const std::vector<Recording> recordings = recorded();
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign design = whole(problem);
+  DesignColumns columns(problem.tiles, design);
+  const TorqueGrams before = sum_grams(columns, problem.nominal, problem.nominal, problem.train);
+  const TorqueModel more = with_more(problem.nominal, design);
+  const TorqueGrams seen = sum_grams(columns, problem.nominal, more, problem.train, {before});
+  check_same(seen, sum_grams(DesignColumns(problem.tiles, design), problem.nominal, more, problem.train));
+  CHECK((*seen)[0].folds[0].xx != (*before)[0].folds[0].xx);
+
+  const TorqueModel turning = more.turning({problem.robot.driven_count(), FrictionTurn{0.01, 1e-4}});
+  columns.turned();
+  const TorqueGrams turned = sum_grams(columns, problem.nominal, turning, problem.train, {seen, true});
+  check_same(turned, sum_grams(DesignColumns(problem.tiles, design), problem.nominal, turning, problem.train));
+  CHECK((*turned)[0].folds[0].xx != (*seen)[0].folds[0].xx);
+}
+
+TEST_CASE("sums of some columns are those that all columns have, to the bit") {
+  const std::vector<Recording> recordings = recorded();
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign design = whole(problem);
+  std::vector<int> some;
+  for (std::size_t c = 0; c < design.terms.size(); c += 3) some.push_back(static_cast<int>(c));
+  const TorqueModel more = with_more(problem.nominal, design);
+  const TorqueGrams all = sum_grams(DesignColumns(problem.tiles, design), problem.nominal, more, problem.test);
+  const TorqueGrams few = sum_grams(DesignColumns(problem.tiles, design, some), problem.nominal, more, problem.test);
+  const std::vector<Noise> noise(problem.robot.driven_count());
+  CHECK((*few)[0].columns.size() < (*all)[0].columns.size());
+  const Gram a = FoldGram(few, 0, noise).of(some), b = FoldGram(all, 0, noise).of(some);
+  CHECK(a.xx == b.xx);
+  CHECK(a.xy == b.xy);
+  CHECK(a.xx.trace() > 0.0);
+}
