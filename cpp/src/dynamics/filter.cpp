@@ -28,12 +28,6 @@ void copy_mirrored(const double* x, Eigen::Index rows, Eigen::Index begin, Eigen
   for (; k < begin + count; ++k) *out++ = 2.0 * x[last] - x[std::max<Eigen::Index>(0, 2 * last - k)];
 }
 
-/// So many rows, or as few more as the kernels take.
-constexpr Eigen::Index padded(Eigen::Index rows) {
-  constexpr Eigen::Index k = kernel::kSampleMultiple;
-  return (rows + k - 1) / k * k;
-}
-
 }  // namespace
 
 // Oppenheim and Schafer, Discrete-time signal processing, 7.2: the ideal low-pass under a Blackman window.
@@ -50,33 +44,47 @@ Eigen::VectorXd low_pass(double cutoff, double step) {
   return weights / weights.sum();
 }
 
+namespace {
+
+/// `count` outputs, as many as kernels take together, of rows from x on.
+void filter_rows(const double* x, const Eigen::VectorXd& weights, Eigen::Index stride, Eigen::Index count,
+                 double* out) {
+  thread_local std::vector<double> scratch;
+  const auto taps = static_cast<int>(weights.size()), step = static_cast<int>(stride), all = static_cast<int>(count);
+  // Many columns act now and then only: beside a knot, while a play is crossed.
+  const double* const end = x + (count - 1) * stride + taps;
+  if (std::all_of(x, end, [](double value) { return value == 0.0; })) {
+    std::fill_n(out, count, 0.0);
+    return;
+  }
+  scratch.resize(kernel::filter_scratch(step, taps, all));
+  kernel::functions().filter(x, step, weights.data(), taps, all, scratch.data(), out);
+}
+
+}  // namespace
+
 void filter_column(const double* x, Eigen::Index rows, const Eigen::VectorXd& weights, Eigen::Index stride,
                    Eigen::Index first, Eigen::Index count, double* out) {
-  constexpr Eigen::Index kTogether = 256;  // what is filtered stays in the first-level cache
-  thread_local std::vector<double> reached, scratch, sums(kTogether);
-  const auto taps = static_cast<int>(weights.size()), step = static_cast<int>(stride);
-  for (Eigen::Index done = 0; done < count; done += kTogether) {
-    const Eigen::Index some = std::min(kTogether, count - done);
-    const Eigen::Index needed = (some - 1) * stride + taps;
-    reached.resize(static_cast<std::size_t>((padded(some) - 1) * stride + taps));
-    copy_mirrored(x, rows, (first + done) * stride - taps / 2, needed, reached.data());
-    std::fill(reached.begin() + needed, reached.end(), 0.0);
-    // Many columns act now and then only: beside a knot, while a play is crossed. No other output sees anything.
-    const auto is_not_zero = [](double value) { return value != 0.0; };
-    const Eigen::Index least = std::find_if(reached.begin(), reached.end(), is_not_zero) - reached.begin();
-    const Eigen::Index most = reached.rend() - std::find_if(reached.rbegin(), reached.rend(), is_not_zero);
-    const Eigen::Index begin = std::min(some, std::max<Eigen::Index>(0, (least - taps + stride) / stride));
-    const Eigen::Index end = std::max(begin, std::min(some, (most + stride - 1) / stride));
-    double* const to = out + done;
-    std::fill_n(to, begin, 0.0);
-    std::fill(to + end, to + some, 0.0);
-    if (begin == end) continue;
-    // Kernels take so many outputs at once: more of them before the first one where there are none behind the last.
-    const Eigen::Index all = padded(end - begin), from = std::min(begin, padded(some) - all);
-    scratch.resize(kernel::filter_scratch(step, taps, static_cast<int>(all)));
-    kernel::functions().filter(reached.data() + from * stride, step, weights.data(), taps, static_cast<int>(all),
-                               scratch.data(), sums.data());
-    std::copy(sums.data() + (begin - from), sums.data() + (end - from), to + begin);
+  constexpr Eigen::Index kTogether = 64, kFew = kernel::kSampleMultiple;
+  thread_local std::vector<double> reached;
+  const Eigen::Index taps = weights.size(), half = taps / 2;
+  for (Eigen::Index done = 0; done < count;) {
+    const Eigen::Index begin = (first + done) * stride - half, left = count - done;
+    const auto is_inside = [&](Eigen::Index some) {
+      return some <= left && begin >= 0 && begin + (some - 1) * stride + taps <= rows;
+    };
+    const Eigen::Index some = is_inside(kTogether) ? kTogether : kFew;
+    if (is_inside(some)) {
+      filter_rows(x + begin, weights, stride, some, out + done);
+    } else {  // at the column's ends
+      double sums[kFew];
+      const Eigen::Index needed = (std::min(kFew, left) - 1) * stride + taps;
+      reached.assign(static_cast<std::size_t>((kFew - 1) * stride + taps), 0.0);
+      copy_mirrored(x, rows, begin, needed, reached.data());
+      filter_rows(reached.data(), weights, stride, kFew, sums);
+      std::copy_n(sums, std::min(kFew, left), out + done);
+    }
+    done += std::min(some, left);
   }
 }
 
