@@ -86,17 +86,14 @@ struct Load {
     store(out + 3 * stride, dot(S[2], v) + lever.z);
     for (int k = 0; k < 6; ++k) store(out + (4 + k) * stride, dot(N[k], n));
   }
-
-  /// Of all parameters of a link together.
-  Vec force(const double* p) const {
-    return splat(p[0]) * a + splat(p[1]) * S[0] + splat(p[2]) * S[1] + splat(p[3]) * S[2];
-  }
-  Vec moment(const double* p) const {
-    Vec out = cross(splat_vec(p + 1), a);
-    for (int k = 0; k < 6; ++k) out = out + splat(p[4 + k]) * N[k];
-    return out;
-  }
 };
+
+/// I v of a link's inertia xx yy zz xy xz yz.
+inline Vec times_inertia(const double* p, Vec v) {
+  return {splat(p[0]) * v.x + splat(p[3]) * v.y + splat(p[4]) * v.z,
+          splat(p[3]) * v.x + splat(p[1]) * v.y + splat(p[5]) * v.z,
+          splat(p[4]) * v.x + splat(p[5]) * v.y + splat(p[2]) * v.z};
+}
 
 /// The turning and, at the base's origin, the velocity that a reading's rate of one gives to what is behind joint i:
 /// the joint about z through o, or along z, adds to those before it.
@@ -123,11 +120,14 @@ inline void add_columns(const RigidProgram& program, const RigidTile& tile, int 
   }
 }
 
+/// Newton and Euler (Luh, Walker and Paul 1980, eq. 4 to 6) of a link with mass p[0], first moment and inertia about
+/// its origin.
 inline void add_torques(const RigidProgram& program, const RigidTile& tile, int i, int first, const Moving& at,
-                        const double* parameters) {
-  const Load load_of_link(at);
-  const Vec force = at.turned(load_of_link.force(parameters));
-  const Vec moment = at.turned(load_of_link.moment(parameters)) + cross(at.o, force);  // about the base's origin
+                        const double* p) {
+  const Vec moment_of_mass = at.turned(splat_vec(p + 1)), w = at.turned_back(at.w);
+  const Vec force = splat(p[0]) * at.a + at.pull(moment_of_mass);
+  const Vec turning = times_inertia(p + 4, at.turned_back(at.alpha)) + cross(w, times_inertia(p + 4, w));
+  const Vec moment = cross(moment_of_mass, at.a) + at.turned(turning) + cross(at.o, force);  // about the base's origin
   for (int k = 0; k < program.driven_count; ++k) {
     const double* twist = tile.scratch + 6 * kLanes * k;
     double* out = tile.blocks[0] + k * tile.column_stride + first;
@@ -187,10 +187,7 @@ inline void add_masses(const RigidProgram& program, const RigidTile& tile, int i
   for (int k = 0; k < driven; ++k) {
     const Vec n = load_lanes(local + 6 * kLanes * k), v = load_lanes(local + 6 * kLanes * k + 3 * kLanes);
     const Vec force = splat(p[0]) * v + cross(n, moment_of_mass);
-    const Vec turning{splat(p[4]) * n.x + splat(p[7]) * n.y + splat(p[8]) * n.z,
-                      splat(p[7]) * n.x + splat(p[5]) * n.y + splat(p[9]) * n.z,
-                      splat(p[8]) * n.x + splat(p[9]) * n.y + splat(p[6]) * n.z};
-    const Vec moment = cross(moment_of_mass, v) + turning;
+    const Vec moment = cross(moment_of_mass, v) + times_inertia(p + 4, n);
     for (int l = 0; l <= k; ++l) {
       const double* other = local + 6 * kLanes * l;
       double* out = tile.blocks[0] + (k * driven + l) * tile.column_stride + first;
