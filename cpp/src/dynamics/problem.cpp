@@ -403,26 +403,25 @@ TorqueDesign standard_design(const Problem& problem) {
   return design;
 }
 
-/// `table`: of `design`. `sums_before`: null, or its sums with the turns before; becomes those of now.
-Groundwork fitted_groundwork(const Problem& problem, const TorqueDesign& design, const DesignColumns& table,
-                             TorqueGrams* sums_before) {
-  const std::vector<bool> with_prior = inertial_columns(design);
-  const std::vector<int> columns = standard_columns(design);
-  const TorqueGrams grams =
-      *sums_before = sum_grams(table, problem.nominal, problem.nominal, problem.train, {*sums_before, true});
+struct StandardFit {
+  Sums sums;
+  Fit fit;
+};
+
+/// `table`: of `design`.
+StandardFit standard_fit(const Problem& problem, const TorqueDesign& design, const DesignColumns& table,
+                         const TorqueGrams& grams) {
   // Each joint by the noise that the fit leaves, which depends on it.
   std::vector<Noise> noise(problem.robot.driven_count());
   for (std::size_t j = 0; j < noise.size(); ++j)
     noise[j].sigma = std::max(0.1 * problem.range.torque[static_cast<Index>(j)], 1e-6);
-  Sums sums;
-  Fit fit;
+  StandardFit out;
   for (int round = 0; round < 2; ++round) {
-    sums = sums_of(grams, noise, design, with_prior);
-    fit = fit_of(sums, columns);
-    noise = noise_of(table, problem.nominal, by_column(design, fit), problem.train);
+    if (round > 0) noise = noise_of(table, problem.nominal, by_column(design, out.fit), problem.train);
+    out.sums = sums_of(grams, noise, design, inertial_columns(design));
+    out.fit = fit_of(out.sums, standard_columns(design));
   }
-  TorqueModel model = problem.nominal.with(valued(design, fit));
-  return {design, std::move(sums), std::move(fit), std::move(model), std::move(noise)};
+  return out;
 }
 
 }  // namespace
@@ -626,15 +625,20 @@ Groundwork groundwork_of(Problem* problem) {
   TorqueDesign design = standard_design(*problem);
   DesignColumns table(problem->tiles, design);
   TorqueGrams grams;
-  choose_turns(problem, [&] {
+  const auto fitted = [&] {
     design = standard_design(*problem);  // of the same columns
     table.turned();
-    const Groundwork groundwork = fitted_groundwork(*problem, design, table, &grams);
-    return rms_of(table, problem->nominal, by_column(design, groundwork.fit), problem->train);
+    grams = sum_grams(table, problem->nominal, problem->nominal, problem->train, {grams, true});
+    return standard_fit(*problem, design, table, grams);
+  };
+  choose_turns(problem, [&] {
+    const StandardFit now = fitted();
+    return rms_of(table, problem->nominal, by_column(design, now.fit), problem->train);
   });
-  design = standard_design(*problem);
-  table.turned();
-  return fitted_groundwork(*problem, design, table, &grams);
+  StandardFit chosen = fitted();
+  std::vector<Noise> noise = noise_of(table, problem->nominal, by_column(design, chosen.fit), problem->train);
+  TorqueModel model = problem->nominal.with(valued(design, chosen.fit));
+  return {design, std::move(chosen.sums), std::move(chosen.fit), std::move(model), std::move(noise)};
 }
 
 }  // namespace truing::dynamics

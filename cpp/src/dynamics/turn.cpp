@@ -50,14 +50,20 @@ VectorXd stop_operator(const Eigen::Ref<const VectorXd>& q, double x0) {
   VectorXd out = VectorXd::Zero(q.size());
   double z = 0.0;
   const auto half_row = [&](double move) {  // its mean
-    const double bound = std::copysign(1.0, move), way = std::abs(move) / x0, room = std::abs(bound - z);
+    const double bound = std::copysign(1.0, move), way = std::abs(move), room = std::abs(bound - z);
     const double begin = z;
-    z = way < room ? z + move / x0 : bound;
-    const double part = way > room ? room / way : 1.0;
-    return part * 0.5 * (begin + z) + (1.0 - part) * bound;
+    if (way <= room) {
+      z += move;
+      return 0.5 * (begin + z);
+    }
+    z = bound;
+    if (room == 0.0) return bound;
+    const double part = room / way;
+    return part * 0.5 * (begin + bound) + (1.0 - part) * bound;
   };
+  const double per_row = 0.5 / x0;
   for (Index i = 1; i < q.size(); ++i) {
-    const double move = 0.5 * (q[i] - q[i - 1]);
+    const double move = per_row * (q[i] - q[i - 1]);
     out[i - 1] += 0.5 * half_row(move);
     out[i] += 0.5 * half_row(move);
   }

@@ -122,11 +122,11 @@ VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double pl
   const double side = 0.5 * play, h = step / kStepsOfARow;
   VectorXd out(load.size());
   double place = 0.0, speed = 0.0;
+  bool on_side = true;
   if (load.size() > 0) out[0] = place = load[0] > 0.0 ? -side : side;
   for (Index i = 1; i < load.size(); ++i) {
     out[i] = place;
-    const bool is_held =
-        speed == 0.0 && std::abs(place) == side && place * load[i - 1] <= 0.0 && place * load[i] <= 0.0;
+    const bool is_held = on_side && place * load[i - 1] <= 0.0 && place * load[i] <= 0.0;
     if (is_held) continue;
     for (int part = 0; part < kStepsOfARow; ++part) {
       const double on = (part + 0.5) / kStepsOfARow;
@@ -137,6 +137,7 @@ VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double pl
       place = std::copysign(side, place);
       speed = 0.0;
     }
+    on_side = speed == 0.0 && std::abs(place) == side;
     out[i] = place;
   }
   return out;
