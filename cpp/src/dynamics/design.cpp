@@ -67,8 +67,8 @@ constexpr int kNarrowKnots = 3 * (kKnots - 1) + 1;  ///< the wide ones among the
 
 /// Straight lines between evenly spaced knots: hat number k.
 Eigen::ArrayXd hat(const VectorXd& x, int k, int knots, double low, double high) {
-  const double width = (high - low) / (knots - 1);
-  return (1.0 - ((x.array().max(low).min(high) - low) / width - k).abs()).max(0.0);
+  const double per_width = (knots - 1) / (high - low);
+  return (1.0 - ((x.array().max(low).min(high) - low) * per_width - k).abs()).max(0.0);
 }
 
 void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int knots, double prior,
@@ -451,7 +451,15 @@ VectorXd FoldGram::products(const std::vector<int>& columns, int with) const {
   return out;
 }
 
-double FoldGram::product(int one, int other) const { return products({one}, other)[0]; }
+double FoldGram::product(int one, int other) const {
+  double out = 0.0;
+  for (std::size_t j = 0; j < grams_->size(); ++j) {
+    const Gram& gram = (*grams_)[j].folds[fold_];
+    const Index row = place_in((*grams_)[j].columns, one), at = place_in((*grams_)[j].columns, other);
+    if (gram.xx.size() > 0 && row >= 0 && at >= 0) out += weights_[j] * gram.xx(row, at);
+  }
+  return out;
+}
 
 double FoldGram::product(int column) const {
   double out = 0.0;

@@ -7,6 +7,8 @@
 #include <map>
 #include <utility>
 
+#include "math/batch.hpp"
+
 namespace truing::dynamics {
 namespace {
 
@@ -45,11 +47,12 @@ double squares_left(const Gram& gram, const VectorXd& solution) {
 
 }  // namespace
 
-Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance)
+Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance, int threads)
     : design_(design),
       sums_(sums),
       groups_(column_groups(design)),
-      evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design), estimation::Nuisance::eliminated) {
+      evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design), estimation::Nuisance::eliminated),
+      threads_(threads) {
   const VectorXd flat = evidence_.evaluate({}).precision;
   for (std::size_t f = 0; f < sums.folds.size(); ++f) folds_.emplace_back(sums, f, evidence_.nuisance(), flat);
   for (const TorqueTerm& term : design.terms) {
@@ -80,7 +83,7 @@ FoldFit::FoldFit(const Sums& sums, std::size_t fold, const std::vector<int>& nui
   left_yy_ = held.yy - follow_y_.dot(held.xy + left_y_);
 }
 
-const FoldFit::Column& FoldFit::column(int number) {
+FoldFit::Column& FoldFit::column(int number) {
   Column& out = columns_[static_cast<std::size_t>(number)];
   if (out.half.size() == 0) {
     out.held = fold_.products(nuisance_, number);
@@ -92,21 +95,21 @@ const FoldFit::Column& FoldFit::column(int number) {
     const double product = fold_.product(number);
     out.right = sums_.all.xy[number] - product - out.half.dot(half_y_);
     out.product = product - out.held.dot(follow_y_) - out.follow.dot(left_y_);
+    out.pairs.resize(++asked_);
   }
   return out;
 }
 
 const FoldFit::Pair& FoldFit::pair(int one, int other) {
   const auto [low, high] = std::minmax(one, other);
-  const auto key = static_cast<std::uint64_t>(low) * columns_.size() + static_cast<std::uint64_t>(high);
-  const auto [at, fresh] = pairs_.try_emplace(key);
-  if (fresh) {
-    const Column &a = column(low), &b = column(high);
+  Column &a = column(low), &b = column(high);
+  Pair& out = a.pairs.size() < b.pairs.size() ? b.pairs[a.pairs.size() - 1] : a.pairs[b.pairs.size() - 1];
+  if (std::isnan(out.held)) {
     const double held = fold_.product(low, high);
-    at->second.others = sums_.all.xx(low, high) - held - a.half.dot(b.half);
-    at->second.held = held - a.follow.dot(b.left) - a.held.dot(b.follow);
+    out.others = sums_.all.xx(low, high) - held - a.half.dot(b.half);
+    out.held = held - a.follow.dot(b.left) - a.held.dot(b.follow);
   }
-  return at->second;
+  return out;
 }
 
 // With the nuisance columns N eliminated, a column x is x - N b of the others' fit, b = (N^T N)^-1 N^T x.
@@ -147,7 +150,9 @@ const VectorXd& Search::squares_of_folds(const Choice& choice) const {
   Look& seen = look(choice);
   if (seen.squares.size() == 0) {
     seen.squares.resize(static_cast<Index>(folds_.size()));
-    for (std::size_t f = 0; f < folds_.size(); ++f) seen.squares[static_cast<Index>(f)] = folds_[f].squares(seen.state);
+    math::for_each_on_threads(
+        folds_.size(), threads_, {},
+        [&](std::size_t f) { seen.squares[static_cast<Index>(f)] = folds_[f].squares(seen.state); }, 1);
   }
   return seen.squares;
 }
@@ -290,11 +295,11 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
   return less_what_is_idle(std::move(choice), limits, free_functions);
 }
 
-Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance) {
+Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance, int threads) {
   Account out;
   out.design = std::move(design);
   out.sums = std::make_shared<const Sums>(std::move(sums));
-  out.search = std::make_shared<const Search>(*out.design, *out.sums, std::move(nuisance));
+  out.search = std::make_shared<const Search>(*out.design, *out.sums, std::move(nuisance), threads);
   return out;
 }
 

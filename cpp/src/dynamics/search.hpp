@@ -5,10 +5,9 @@
 // Which effects explain the torques: one after the other by evidence, and only those that predict folds they were not
 // fitted to.
 
-#include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -37,20 +36,22 @@ class FoldFit {
   double squares(const Evidence::State& state);
 
  private:
-  /// One of the columns x beside the nuisance columns N; of these only what was asked for is known.
-  struct Column {
-    Eigen::VectorXd held;    ///< N^T x on the fold
-    Eigen::VectorXd half;    ///< L^-1 N^T x on the others
-    Eigen::VectorXd follow;  ///< what the nuisance columns' values give way by, for a value of one
-    Eigen::VectorXd left;    ///< N^T (x - N follow) on the fold
-    double right = 0.0;      ///< with the torque, less what the nuisance columns take of both: on the others …
-    double product = 0.0;    ///< … and on the fold
-  };
-  const Column& column(int number);
-  /// Of two such columns, less what the nuisance columns take of them: their product on the others, and on the fold.
+  /// Of two columns beside the nuisance columns N, less what these take of them: their product on the others, and on
+  /// the fold. NaN: nobody has asked for it.
   struct Pair {
-    double others, held;
+    double others = std::numeric_limits<double>::quiet_NaN(), held = others;
   };
+  /// One of these columns, x; of them only what was asked for is known.
+  struct Column {
+    Eigen::VectorXd held;     ///< N^T x on the fold
+    Eigen::VectorXd half;     ///< L^-1 N^T x on the others
+    Eigen::VectorXd follow;   ///< what the nuisance columns' values give way by, for a value of one
+    Eigen::VectorXd left;     ///< N^T (x - N follow) on the fold
+    double right = 0.0;       ///< with the torque, less what the nuisance columns take of both: on the others …
+    double product = 0.0;     ///< … and on the fold
+    std::vector<Pair> pairs;  ///< with every column that was asked for no later than this one, in that order
+  };
+  Column& column(int number);
   const Pair& pair(int one, int other);
 
   const Sums& sums_;
@@ -61,14 +62,14 @@ class FoldFit {
   Eigen::VectorXd half_y_, follow_y_, left_y_;  ///< as of a column, of the torque
   double left_yy_ = 0.0;                        ///< squared error of the nuisance columns alone
   std::vector<Column> columns_;                 ///< by number
-  std::unordered_map<std::uint64_t, Pair> pairs_;
+  std::size_t asked_ = 0;                       ///< so many of them
 };
 
 /// Candidates over one set of sums.
 class Search {
  public:
-  /// `nuisance`: columns that are always in.
-  Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance);
+  /// `nuisance`: columns that are always in. Folds are fitted on so many threads (0: as many as the machine has).
+  Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nuisance, int threads = 1);
 
   /// Takes effects as long as they win; starts from `choice`.
   Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
@@ -111,6 +112,7 @@ class Search {
   const Sums& sums_;
   std::vector<ColumnGroup> groups_;
   Evidence evidence_;
+  int threads_;
   mutable std::vector<FoldFit> folds_;
   mutable std::map<std::pair<std::vector<int>, std::vector<double>>, Look> looks_;  ///< by groups and scales
   std::size_t joints_ = 1;
@@ -122,9 +124,9 @@ struct Account {
   std::shared_ptr<const Sums> sums;
   std::shared_ptr<const Search> search;
   Choice choice{};
-  bool inertias_given = false;         ///< links' inertias are the file's, but for those that were chosen
-  std::vector<FoldGram> held_out = {}; ///< recordings that nothing was fitted to: of what was chosen alone
+  bool inertias_given = false;          ///< links' inertias are the file's, but for those that were chosen
+  std::vector<FoldGram> held_out = {};  ///< recordings that nothing was fitted to: of what was chosen alone
 };
-Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance);
+Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance, int threads);
 
 }  // namespace truing::dynamics
