@@ -90,15 +90,11 @@ class TableSum {
     sums_.resize(std::max(sums_.size(), kernel::functions().gram_size(columns)), 0.0);
     for (Index done = 0; done < count; done += kTogether) {
       const Index some = std::min(kTogether, count - done), all = RigidChain::padded(some);
-      const Index first = rows[static_cast<std::size_t>(done)];
-      const bool in_a_row = rows[static_cast<std::size_t>(done + some - 1)] == first + some - 1;
+      find_runs(rows.data() + done, some);
       for (Index c = 0; c < table.cols(); ++c) {
         const double* const from = table.col(order.columns[static_cast<std::size_t>(c)]).data();
-        double* const to = rows_.col(c).data();
-        if (in_a_row)
-          std::copy_n(from + first, some, to);
-        else
-          for (Index i = 0; i < some; ++i) to[i] = from[rows[static_cast<std::size_t>(done + i)]];
+        double* to = rows_.col(c).data();
+        for (const auto& [first, length] : runs_) to = std::copy_n(from + first, length, to);
       }
       rows_.middleRows(some, all - some).setZero();
       kernel::functions().gram_add(rows_.data(), kTogether, columns, static_cast<int>(order.known),
@@ -110,6 +106,17 @@ class TableSum {
   }
 
  private:
+  /// Rows that follow each other are copied together.
+  void find_runs(const Index* rows, Index count) {
+    runs_.clear();
+    for (Index i = 0; i < count; ++i) {
+      if (i > 0 && rows[i] == rows[i - 1] + 1)
+        ++runs_.back().second;
+      else
+        runs_.emplace_back(rows[i], 1);
+    }
+  }
+
   Gram in_place(const SumOrder& order, double count) const {
     const Index x = products_.cols() - 1;
     Gram out;
@@ -129,6 +136,7 @@ class TableSum {
   }
 
   static constexpr Index kTogether = 256;
+  std::vector<std::pair<Index, Index>> runs_;  ///< first row, and how many
   MatrixXd rows_;
   std::vector<double> sums_;  ///< the kernel's own: nought between two calls
   MatrixXd products_;
@@ -292,7 +300,11 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
   const auto add = [&](std::size_t k) {
     for (std::size_t j = 0; j < out->size(); ++j) {
       for (std::size_t f = 0; f < lot[k][j].size(); ++f) {
-        if (lot[k][j][f].xx.size() > 0) (*out)[j].folds[f].add(lot[k][j][f]);
+        Gram &sum = (*out)[j].folds[f], &more = lot[k][j][f];
+        if (sum.xx.size() == 0)
+          sum = std::move(more);
+        else if (more.xx.size() > 0)
+          sum.add(more);
       }
     }
     lot[k].clear();

@@ -9,6 +9,7 @@
 #include "dynamics/effects/families.hpp"
 #include "dynamics/payload.hpp"
 #include "dynamics/turn.hpp"
+#include "math/batch.hpp"
 #include "math/statistics.hpp"
 
 namespace truing::dynamics {
@@ -506,11 +507,15 @@ Gram sum_of_folds(const JointGrams& grams, const Noise& noise) {
   return out;
 }
 
-Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns) {
+Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns,
+                  int threads) {
   const auto p = static_cast<Index>(columns);
+  std::vector<Gram> joints(grams.size());
+  math::for_each_on_threads(
+      grams.size(), threads, {}, [&](std::size_t j) { joints[j] = sum_of_folds(grams[j], noise[j]); }, 1);
   Gram out{MatrixXd::Zero(p, p), VectorXd::Zero(p), 0.0, 0.0};
   for (std::size_t j = 0; j < grams.size(); ++j) {
-    const Gram sum = sum_of_folds(grams[j], noise[j]);
+    const Gram& sum = joints[j];
     out.n += sum.n;
     if (sum.xx.size() == 0) continue;
     const std::vector<int>& at = grams[j].columns;

@@ -118,7 +118,8 @@ class FoldGram {
 
 /// All folds of a joint together, in units of its noise, with rows that count as one.
 Gram sum_of_folds(const JointGrams& grams, const Noise& noise);
-/// All folds and joints together, in the same units.
-Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns);
+/// All folds and joints together, in the same units; joints on so many threads (0: as many as the machine has).
+Gram sum_of_folds(const std::vector<JointGrams>& grams, const std::vector<Noise>& noise, std::size_t columns,
+                  int threads = 1);
 
 }  // namespace truing::dynamics

@@ -234,8 +234,9 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
   more.masses_given = true;
   const auto searched = [&](const TorqueGrams& train, const Choice& start) {
     const std::vector<bool> none(free.design->terms.size(), false);
-    Account out = account_of(free.design, sums_of(train, noise, *free.design, none), friction_columns(*free.design),
-                             problem.tiles.threads());
+    const int threads = problem.tiles.threads();
+    Account out = account_of(free.design, sums_of(train, noise, *free.design, none, threads),
+                             friction_columns(*free.design), threads);
     out.choice = out.search->run(start, more, false);
     out.inertias_given = true;
     return out;
@@ -276,7 +277,8 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   *noise = noise_of_all(problem, columns, grams, *noise);
   std::vector<bool> priors = inertial_columns(*design);
   if (problem.fitted_before || of_effects.inertias_given) priors.assign(priors.size(), false);
-  Account out = account_of(design, sums_of(grams, *noise, *design, priors), nuisance, problem.tiles.threads());
+  const int threads = problem.tiles.threads();
+  Account out = account_of(design, sums_of(grams, *noise, *design, priors, threads), nuisance, threads);
   SearchLimits of_functions = limits;
   of_functions.least_gain = std::max(kLeastGainOfFunctions, limits.least_gain);
   of_functions.most = static_cast<int>(choice.groups.size()) + kMostFunctions;
@@ -330,13 +332,13 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
       }
     }
     if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train, {grams, turned});
-    const Sums sums = sums_of(grams, noise, *design, priors);
+    const Sums sums = sums_of(grams, noise, *design, priors, options.threads);
     const Search search(*design, sums, nuisance, options.threads);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
     model = fitted_model(problem, *design, sums, search, choice);
     if (round + 2 >= kRounds) noise = noise_of(problem.tiles, model, problem.train);
   }
-  Account free = account_of(design, sums_of(grams, noise, *design, priors), nuisance, options.threads);
+  Account free = account_of(design, sums_of(grams, noise, *design, priors, options.threads), nuisance, options.threads);
   free.choice = choice;
   free.choice = without_what_hides(free);
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {

@@ -194,10 +194,10 @@ std::vector<int> standard_columns(const TorqueDesign& design) {
 }
 
 Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
-             const std::vector<bool>& with_prior) {
+             const std::vector<bool>& with_prior, int threads) {
   Sums out;
   for (std::size_t f = 0; f < grams->front().folds.size(); ++f) out.folds.emplace_back(grams, f, noise);
-  out.all = sum_of_folds(*grams, noise, design.terms.size());
+  out.all = sum_of_folds(*grams, noise, design.terms.size(), threads);
   out.precision = VectorXd::Zero(static_cast<Index>(design.terms.size()));
   for (std::size_t c = 0; c < design.terms.size(); ++c) {
     if (with_prior[c]) out.precision[static_cast<Index>(c)] = std::pow(design.terms[c].prior, -2.0);

@@ -57,7 +57,7 @@ struct Sums {
 
 /// `with_prior`: by column, whether its term's prior holds; the others are flat.
 Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
-             const std::vector<bool>& with_prior);
+             const std::vector<bool>& with_prior, int threads = 1);
 
 Fit fit_of(const Sums& sums, const std::vector<int>& columns, const Eigen::VectorXd& ridge = {});
 
