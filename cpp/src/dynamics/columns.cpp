@@ -177,7 +177,14 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
 }  // namespace
 
 DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
-    : DesignColumns(tiles, design, all_columns(design)) {}
+    : DesignColumns(tiles, design, all_columns(design)) {
+  constexpr double kMostKept = 400.0 * 1024 * 1024;  ///< [bytes]
+  double numbers = 0.0;
+  for (const std::vector<int>& mine : by_joint_) numbers += static_cast<double>(mine.size() + 1);
+  const Index rows = tiles.kept_rows();
+  if (rows >= 0 && sizeof(double) * numbers * static_cast<double>(rows) < kMostKept) kept_.resize(tiles.kept_tiles());
+  stale_.resize(kept_.size(), 0);
+}
 
 DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns)
     : tiles_(tiles),
@@ -185,12 +192,6 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std
       chain_(tiles.robot()),
       columns_(std::move(columns)),
       by_joint_(columns_by_joint(design, columns_, tiles.robot().driven_count())) {
-  constexpr double kMostKept = 400.0 * 1024 * 1024;  ///< [bytes]
-  double numbers = 0.0;
-  for (const std::vector<int>& mine : by_joint_) numbers += static_cast<double>(mine.size() + 1);
-  const Index rows = tiles.kept_rows();
-  if (rows >= 0 && sizeof(double) * numbers * static_cast<double>(rows) < kMostKept) kept_.resize(tiles.kept_tiles());
-  stale_.resize(kept_.size(), 0);
   for (const int c : columns_) {
     const TorqueTerm& term = design.terms[static_cast<std::size_t>(c)];
     needs_rigid_ = needs_rigid_ || (term.link_parameter < 0 && term.needs_rigid);
@@ -200,7 +201,8 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std
 }
 
 const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<MatrixXd>* made) const {
-  std::vector<MatrixXd>& place = kept_.empty() ? *made : tile->memory.links;
+  const bool known = !tile->memory.links.empty();
+  std::vector<MatrixXd>& place = kept_.empty() && !known ? *made : tile->memory.links;
   if (place.empty()) place = filtered_links(chain_, *tile);
   return place;
 }

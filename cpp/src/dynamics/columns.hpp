@@ -20,7 +20,7 @@ class DesignColumns {
 
   /// Both must outlive it.
   DesignColumns(const Tiles& tiles, const TorqueDesign& design);
-  /// Of some columns of the design alone, ascending numbers.
+  /// Of some columns of the design alone, ascending numbers; they are not kept.
   DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns);
 
   const Tiles& tiles() const { return tiles_; }
@@ -48,7 +48,7 @@ class DesignColumns {
   std::vector<int> columns_;  ///< ascending
   std::vector<std::vector<int>> by_joint_;
   bool needs_rigid_ = false, needs_torque_ = false, needs_inertia_ = false;
-  mutable std::vector<Tables> kept_;  ///< by tile; empty: not yet made
+  mutable std::vector<Tables> kept_;  ///< by tile, where they are kept; empty: not yet made
   mutable std::vector<char> stale_;   ///< by tile: turned() since
 };
 
