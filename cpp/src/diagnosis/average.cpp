@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "diagnosis/diagnosis.hpp"
 #include "model/model.hpp"
@@ -73,17 +74,19 @@ Identification back_to_the_floor(const Registered& whole, const Robot& average, 
 
 }  // namespace
 
-double average_with_links(const Registered& whole, const Work& work, const Robot& robot, const Choice& choice,
-                          Identification* found) {
-  const int links = all_links(work);
-  if (links < 0 || !has_few_poses(work, links)) return 1.0;
-  const Choice wide = {{links}, {1.0}};  // as far off as robots get
-  // Links that no search found, beside nothing that a robot file can hold, count for half at most.
-  const double part = std::max(stacked_part(work, choice, wide), choice.groups.empty() ? 0.5 : 0.0);
-  if (part == 1.0) return 1.0;
+/// The size of links' errors that the training poses speak for, as a part of the widest prior.
+static double likeliest_scale(const Work& work, int links) {
+  const Evidence evidence = evidence_now(work);
+  const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(links)].columns;
+  return evidence.gain(evidence.evaluate({}), columns, 0.0).scale;
+}
+
+/// Some part of a fit, and the rest of links alone.
+static void mix_in(const Registered& whole, const Work& work, const Robot& robot, const Choice& links, double part,
+                   Identification* found) {
   Measurements data = whole.data;
   data.set = whole.set;
-  const RefitTask task = refit_task(work, work.inputs, robot, evidence_now(work).evaluate(wide), wide.groups);
+  const RefitTask task = refit_task(work, work.inputs, robot, evidence_now(work).evaluate(links), links.groups);
   const Identification other = identify(task.start, data, task.options);
   const Identification settled =
       back_to_the_floor(whole, robot_between(other.robot, found->robot, whole, part), task, other, *found);
@@ -92,7 +95,26 @@ double average_with_links(const Registered& whole, const Work& work, const Robot
     p.value = part * p.value + (1.0 - part) * value_of(p.name, other.parameters, p.nominal);
     if (const Parameter* moved = parameter_named(p.name, settled.parameters)) p.value += moved->value - moved->nominal;
   }
-  return part;
+}
+
+double average_with_links(const Registered& whole, const Work& work, const Robot& robot, const Choice& choice,
+                          Identification* found) {
+  const int links = all_links(work);
+  if (links < 0 || !has_few_poses(work, links)) return 1.0;
+  // Links that no search found, beside nothing that a robot file can hold, count for half at most.
+  const double least = choice.groups.empty() ? 0.5 : 0.0;
+  Average average = {{choice}, {1.0}};
+  // Under the prior that these poses speak for, and as far off as robots get.
+  for (const double scale : std::set<double>{likeliest_scale(work, links), 1.0}) {
+    const Choice alone = {{links}, {scale}};
+    const double part = std::max(stacked_part(work, average, alone), least / average.parts[0]);
+    if (part >= 1.0) continue;
+    mix_in(whole, work, robot, alone, part, found);
+    for (double& of : average.parts) of *= part;
+    average.of.push_back(alone);
+    average.parts.push_back(1.0 - part);
+  }
+  return average.parts[0];
 }
 
 }  // namespace truing::diagnosis

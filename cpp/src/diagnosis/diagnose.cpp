@@ -340,12 +340,11 @@ void say_what_was_averaged(double part, Diagnosis* out) {
   if (part == 1.0) return;
   const auto percent = [](double of) { return number(100.0 * of, 2) + " %"; };
   out->warnings.push_back(
-      out->effects.empty()
-          ? "these poses are few: though no cause is named, the robot file has " + percent(1.0 - part) +
-                " of all wrong links, under a wide prior; training poses are predicted best so"
-          : "these poses are few: the robot file, and the values of what is named, are an average, " + percent(part) +
-                " of what was found and " + percent(1.0 - part) +
-                " of wrong links alone, under a wide prior; training poses are predicted best so");
+      out->effects.empty() ? "these poses are few: though no cause is named, the robot file has " +
+                                 percent(1.0 - part) + " of all wrong links; training poses are predicted best so"
+                           : "these poses are few: the robot file, and the values of what is named, are an average, " +
+                                 percent(part) + " of what was found and " + percent(1.0 - part) +
+                                 " of wrong links alone; training poses are predicted best so");
 }
 
 /// Noise from repeats where there are enough, else what the chosen model leaves; and how much of the gap beyond it is

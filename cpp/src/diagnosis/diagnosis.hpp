@@ -149,10 +149,17 @@ Eigen::VectorXd squares_of_folds(const Work& work, const Choice& choice);
 /// (Varma and Simon 2006). A quarter of the folds at a time; `choose`: from the sums of the other folds.
 Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(const Gram&)>& choose);
 double cross_validated(const Work& work, const Choice& choice);
-/// Part of one choice's fit in the average with another's that misses training folds least, each predicted from the
-/// others: stacked regressions (Breiman 1996) of two fits whose parts are not negative and add up to one.
-/// Where both predict the same: all of the one.
-double stacked_part(const Work& work, const Choice& one, const Choice& other);
+/// Fits of some choices, of each so much: `parts` add up to one.
+struct Average {
+  std::vector<Choice> of;
+  std::vector<double> parts;
+};
+
+/// Part of an average of fits in one with a further choice's fit that misses training folds least, each predicted from
+/// the others: stacked regressions (Breiman 1996), parts not negative and adding up to one. What the folds do not know
+/// of it draws it towards equal parts of all fits (Diebold and Pauly 1990, The use of prior information in forecast
+/// combination). Where both predict the same, there is nothing to average: 1.
+double stacked_part(const Work& work, const Average& one, const Choice& other);
 /// Does one choice predict the folds better than another, by this factor and for sure?
 bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);
 /// Of every training fold by a fit to the others, and of the poses held out by the fit to all training folds.

@@ -78,25 +78,80 @@ Eigen::VectorXd squares_of_parts(const Work& work, const std::function<Choice(co
   return out;
 }
 
-double stacked_part(const Work& work, const Choice& one, const Choice& other) {
-  constexpr double kAlike = 1e-4;  // of the squares: the fits predict the same
-  const Fits a = fits_of(work, one), b = fits_of(work, other);
-  std::vector<int> columns = a.columns;
-  columns.insert(columns.end(), b.columns.begin(), b.columns.end());  // some of them twice, and each time a part
-  const auto squares = [&](double part) {
-    double out = 0.0;
-    for (std::size_t fold = 0; fold < a.without.size(); ++fold) {
-      Eigen::VectorXd average(static_cast<Eigen::Index>(columns.size()));
-      average << part * a.without[fold], (1.0 - part) * b.without[fold];
-      out += held_out_squares(work.grams.train_folds[fold], columns, average);
+namespace {
+
+/// What one fold leaves of an average of two fits, as it depends on the one's part p, in units of the fold's own:
+/// |b + p d|^2, with b what the other leaves and d how the two differ.
+struct Parabola {
+  double d2 = 0.0, bd = 0.0;
+};
+
+/// Of their squares at parts 0, 1/2 and 1. A fold's unit is the geometric mean of what both leave, or a single fold
+/// could decide.
+Parabola parabola_of(double none, double half, double whole) {
+  const double unit = std::max(std::sqrt(none * whole), 1e-300), d2 = 2.0 * (none + whole - 2.0 * half);
+  return {d2 / unit, 0.5 * (whole - none - d2) / unit};
+}
+
+/// The part by least squares, with its sandwich standard error over the folds; and what is known beforehand of a number
+/// in [0, 1], that it is `usual`, with the variance of a uniform one.
+double shrunk_part(const std::vector<Parabola>& folds, double usual) {
+  constexpr double kVariance = 1.0 / 12.0;
+  double d2 = 0.0, bd = 0.0, scatter = 0.0;
+  for (const Parabola& fold : folds) {
+    d2 += fold.d2;
+    bd += fold.bd;
+  }
+  const double part = -bd / d2;
+  for (const Parabola& fold : folds) scatter += std::pow(fold.bd + part * fold.d2, 2.0);
+  const auto n = static_cast<double>(folds.size());
+  const double variance = scatter * n / (n - 1.0) / (d2 * d2);
+  return std::clamp((part * kVariance + usual * variance) / (kVariance + variance), 0.0, 1.0);
+}
+
+/// Of the fits to all training folds but one, as one linear model: columns may stand in it twice.
+struct AveragedFits {
+  std::vector<int> columns;
+  std::vector<Eigen::VectorXd> without;
+};
+
+AveragedFits averaged(const Work& work, const Average& average) {
+  AveragedFits out;
+  out.without.resize(work.grams.train_folds.size());
+  for (std::size_t k = 0; k < average.of.size(); ++k) {
+    const Fits fits = fits_of(work, average.of[k]);
+    out.columns.insert(out.columns.end(), fits.columns.begin(), fits.columns.end());
+    for (std::size_t fold = 0; fold < out.without.size(); ++fold) {
+      Eigen::VectorXd both(static_cast<Eigen::Index>(out.columns.size()));
+      both << out.without[fold], average.parts[k] * fits.without[fold];
+      out.without[fold] = std::move(both);
     }
-    return out;
-  };
-  // They are a parabola of the part.
-  const double none = squares(0.0), half = squares(0.5), whole = squares(1.0);
-  const double bend = none + whole - 2.0 * half;
-  if (bend <= kAlike * whole) return 1.0;
-  return std::clamp((3.0 * none + whole - 4.0 * half) / (4.0 * bend), 0.0, 1.0);
+  }
+  return out;
+}
+
+}  // namespace
+
+double stacked_part(const Work& work, const Average& one, const Choice& other) {
+  constexpr double kAlike = 1e-4;  // of the squares: the fits predict the same
+  const AveragedFits a = averaged(work, one), b = averaged(work, {{other}, {1.0}});
+  std::vector<int> columns = a.columns;
+  columns.insert(columns.end(), b.columns.begin(), b.columns.end());
+  std::vector<Parabola> folds;
+  double apart = 0.0, left = 0.0;
+  for (std::size_t fold = 0; fold < a.without.size(); ++fold) {
+    const auto squares = [&](double part) {
+      Eigen::VectorXd both(static_cast<Eigen::Index>(columns.size()));
+      both << part * a.without[fold], (1.0 - part) * b.without[fold];
+      return held_out_squares(work.grams.train_folds[fold], columns, both);
+    };
+    const double none = squares(0.0), half = squares(0.5), whole = squares(1.0);
+    apart += none + whole - 2.0 * half;
+    left += whole;
+    folds.push_back(parabola_of(none, half, whole));
+  }
+  const auto fits = static_cast<double>(one.of.size());
+  return apart <= kAlike * left ? 1.0 : shrunk_part(folds, fits / (fits + 1.0));
 }
 
 double cross_validated(const Work& work, const Choice& choice) { return squares_of_folds(work, choice).sum(); }

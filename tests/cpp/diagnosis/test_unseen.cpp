@@ -83,20 +83,34 @@ TEST_CASE("the part of a fit in an average is that which poses it did not see ha
   using truing::diagnosis::stacked_part;
   using truing::estimation::Choice;
   const truing::diagnosis::Work work = two_candidates(0.5);
-  const Choice first = {{0}, {1.0}}, held = {{0}, {0.05}}, nothing = {};
-  CHECK(stacked_part(work, first, nothing) > 0.95);
-  CHECK(stacked_part(work, nothing, first) < 0.05);
+  const Choice first = {{0}, {1.0}}, held = {{0}, {0.05}}, nothing = {}, both = {{0, 1}, {1.0, 1.0}};
+  const auto part = [&](const Choice& one, const Choice& other) { return stacked_part(work, {{one}, {1.0}}, other); };
+  CHECK(part(first, nothing) > 0.95);
+  CHECK(part(nothing, first) < 0.05);
   // Where both predict the same, whatever rounding leaves between them.
   for (const double noise : {0.1, 0.3, 0.5, 1.0}) {
     const truing::diagnosis::Work other = two_candidates(noise);
-    CHECK(stacked_part(other, first, first) == 1.0);
-    CHECK(stacked_part(other, {{0, 1}, {1.0, 0.1}}, {{1, 0}, {0.1, 1.0}}) == 1.0);
+    CHECK(stacked_part(other, {{first}, {1.0}}, first) == 1.0);
+    CHECK(stacked_part(other, {{{{0, 1}, {1.0, 0.1}}}, {1.0}}, {{1, 0}, {0.1, 1.0}}) == 1.0);
   }
   // A choice and its complement share an average.
-  const double part = stacked_part(work, held, {{0, 1}, {1.0, 1.0}});
-  CHECK(part > 0.0);
-  CHECK(part < 1.0);
-  CHECK(stacked_part(work, {{0, 1}, {1.0, 1.0}}, held) == doctest::Approx(1.0 - part));
+  CHECK(part(held, both) > 0.0);
+  CHECK(part(held, both) < 1.0);
+  CHECK(part(both, held) == doctest::Approx(1.0 - part(held, both)));
+  // An average of one fit with itself is that fit.
+  CHECK(stacked_part(work, {{first, first}, {0.3, 0.7}}, first) == 1.0);
+}
+
+TEST_CASE("a part that poses do not know is that of equal parts of all fits") {
+  using truing::diagnosis::stacked_part;
+  using truing::estimation::Choice;
+  const truing::diagnosis::Work work = two_candidates(0.5);
+  // The second column says nothing: with it and without it, folds are predicted alike but for chance.
+  const Choice first = {{0}, {1.0}}, both = {{0, 1}, {1.0, 1.0}};
+  const double of_two = stacked_part(work, {{first}, {1.0}}, both);
+  const double of_three = stacked_part(work, {{first, first}, {0.5, 0.5}}, both);
+  CHECK(of_three > of_two);  // two of three, not one of two
+  CHECK(of_three - of_two < 1.0 / 6.0);
 }
 
 TEST_CASE("the sentence says how sure held-out poses are") {
