@@ -29,8 +29,7 @@ namespace {
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 constexpr std::size_t kFewRows = 300;
-constexpr double kMostLag = 0.5, kLagStep = 0.02, kLagResolution = 1e-5;  ///< [s]
-constexpr double kSmall = 0.1;                                            ///< of the error that is left
+constexpr double kSmall = 0.1;  ///< of the error that is left
 
 /// What base and targets are fitted by, before statistics.
 IdentifyOptions frames_alone(const Robot& robot, const DiagnoseOptions& options) {
@@ -257,37 +256,6 @@ double error_of_joints_at(const Robot& robot, const Measurements& data, const Di
   return identify(robot, some, frames_alone(robot, options)).train.after.median;
 }
 
-/// Where the error is least: steps as long as kLagStep, then the golden section around the best of them.
-double best_lag(const std::function<double(double)>& error) {
-  constexpr double kGolden = 0.6180339887498949;
-  double best = 0.0, least = error(0.0);
-  for (double later = -kMostLag; later < kMostLag + 0.5 * kLagStep; later += kLagStep) {
-    const double here = error(later);
-    if (!(here < least)) continue;
-    least = here;
-    best = later;
-  }
-  double low = best - kLagStep, high = best + kLagStep;
-  double one = high - kGolden * (high - low), other = low + kGolden * (high - low);
-  double at_one = error(one), at_other = error(other);
-  while (high - low > kLagResolution) {
-    if (at_one < at_other) {
-      high = other;
-      other = one;
-      at_other = at_one;
-      one = high - kGolden * (high - low);
-      at_one = error(one);
-    } else {
-      low = one;
-      one = other;
-      at_one = at_other;
-      other = low + kGolden * (high - low);
-      at_other = error(other);
-    }
-  }
-  return 0.5 * (low + high);
-}
-
 /// How far a tip is off where joints are taken `later` [s] by their speeds alone, rms [m].
 double beyond_first_order(const Robot& robot, const Measurements& data, double later) {
   const Measurements now = model::with_joints_at(data, 0.0), then = model::with_joints_at(data, later);
@@ -308,7 +276,7 @@ void undo_lag(const Robot& robot, const DiagnoseOptions& options, double spread,
   const auto error = [&](double later) { return error_of_joints_at(robot, out->data, options, later); };
   const double as_is = error(0.0);
   if (!(as_is > kWorthALook * spread)) return;
-  const double later = best_lag(error), left = error(later);
+  const double later = model::best_lag(error), left = error(later);
   if (!(left < 0.5 * as_is) || beyond_first_order(robot, out->data, later) < kSmall * left) return;
   out->data = model::with_joints_at(out->data, later);
   out->findings.push_back({"lag",

@@ -18,6 +18,7 @@
 #include "model/readings.hpp"
 #include "model/repeats.hpp"
 #include "model/row_slip.hpp"
+#include "model/time_series.hpp"
 #include "rooms.hpp"
 
 namespace truing {
@@ -163,6 +164,19 @@ class Trials {
     return Moved{*change, together, apart};
   }
 
+  /// How much later the joints are to be taken of a robot that moved while it was measured, if that explains far more;
+  /// and the median errors without and with it, base and targets fitted [m].
+  struct Lag {
+    double later, as_is, left;
+  };
+  std::optional<Lag> lag(const Robot& robot, const Measurements& data) const {
+    const auto error = [&](double later) { return error_later(robot, data, later); };
+    Lag out{best_lag(error), error(0.0), 0.0};
+    out.left = error(out.later);
+    if (!(out.left < kBetter * out.as_is)) return {};
+    return out;
+  }
+
   /// From where on joints and measurements are some rows apart, if they are.
   std::optional<RowSlip> slip(const Robot& robot, const Measurements& data) const {
     FramesFit frames;
@@ -193,6 +207,17 @@ class Trials {
     frames.priors.clear();
     frames.max_iterations = std::min(frames.max_iterations, kIterations);
     return frames;
+  }
+
+  /// Median error of a few rows with the joints as they were `later` [s], base and targets fitted [m].
+  double error_later(const Robot& robot, const Measurements& data, double later) const {
+    Measurements then = with_joints_at(data, later);
+    std::vector<double> weights(data.rows, 0.0);
+    for (const std::int32_t row : sample_.rows)
+      weights[static_cast<std::size_t>(row)] = then.weight[static_cast<std::size_t>(row)];
+    then.weight = {weights.data(), 1};
+    then.set.assign(data.rows, 0);
+    return identify(robot, then, frames_alone(robot)).train.after.median;
   }
 
   /// Median error of rows `begin` to `end` with base and targets fitted to these alone [m].
@@ -286,6 +311,17 @@ Mistake moved_from(const Trials::Moved& moved, std::vector<Parameter> changes) {
   return out;
 }
 
+Mistake late(const Trials::Lag& lag, std::vector<Parameter> changes) {
+  Mistake out;
+  out.kind = "lag";
+  out.text = "the clocks of joints and measurement differ: what was measured belongs to where the joints were " +
+             number(1e3 * std::abs(lag.later), 3) + " ms " + (lag.later > 0.0 ? "later" : "earlier") +
+             ". That leaves a median error of " + millimetres(lag.left) + " in place of " + millimetres(lag.as_is) +
+             " with base and tool fitted. Correct the times of the joints and run again; diagnose goes on without.";
+  out.changes = std::move(changes);
+  return out;
+}
+
 Mistake unexplained(std::vector<Parameter> changes) {
   Mistake out;
   out.kind = "unexplained";
@@ -307,6 +343,8 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
   std::vector<Parameter> changes = workshop.changes(found);
   for (const Robot* robot : {&found.robot, &nominal}) {
     if (const auto moved = trials.moved_instrument(*robot, data)) return moved_from(*moved, std::move(changes));
+    if (!moved_while_measured(data)) continue;
+    if (const auto lag = trials.lag(*robot, data)) return late(*lag, std::move(changes));
   }
   const bool much_left = found.train.after.median > kWorthALook * measured_range(data, fitted_rows(found));
   if (changes.empty() && !much_left && !has_rows_far_out(found)) return std::nullopt;

@@ -19,6 +19,8 @@ constexpr double kStops = 0.25;  ///< [s] a robot that stops for every row needs
 constexpr double kGap = 3.0;     ///< times the usual step
 constexpr double kMidway = 0.3;  ///< of the way from row to next but one, that the row between may lie off its middle
 
+constexpr double kMostLag = 0.5, kLagStep = 0.02, kLagResolution = 1e-5;  ///< [s]
+
 double step_after(const Measurements& data, std::size_t row) { return data.time[row + 1] - data.time[row]; }
 
 /// [s] from row to row; 0: there is no time, or it does not ascend.
@@ -112,6 +114,36 @@ Measurements with_joints_at(const Measurements& data, double later) {
   out.weight = of(2 * joints);
   out.owner = owned;
   return out;
+}
+
+double best_lag(const std::function<double(double)>& error) {
+  constexpr double kGolden = 0.6180339887498949;
+  double best = 0.0, least = error(0.0);
+  for (double later = -kMostLag; later < kMostLag + 0.5 * kLagStep; later += kLagStep) {
+    const double here = error(later);
+    if (!(here < least)) continue;
+    least = here;
+    best = later;
+  }
+  double low = best - kLagStep, high = best + kLagStep;
+  double one = high - kGolden * (high - low), other = low + kGolden * (high - low);
+  double at_one = error(one), at_other = error(other);
+  while (high - low > kLagResolution) {
+    if (at_one < at_other) {
+      high = other;
+      other = one;
+      at_other = at_one;
+      one = high - kGolden * (high - low);
+      at_one = error(one);
+    } else {
+      low = one;
+      one = other;
+      at_one = at_other;
+      other = low + kGolden * (high - low);
+      at_other = error(other);
+    }
+  }
+  return 0.5 * (low + high);
 }
 
 }  // namespace model

@@ -5,6 +5,8 @@
 // Measurements of a robot that moves: rows follow each other as a tracker streams them, and no joint stands still for
 // its row.
 
+#include <functional>
+
 #include "rooms.hpp"
 #include "truing/model/measurement.hpp"
 
@@ -17,5 +19,9 @@ bool moved_while_measured(const Measurements& data);
 /// The data with the joints as they were `later` seconds after each row: cubics through readings and speeds (Hermite).
 /// Speeds as inferred. Rows for which there is no reading on both sides have the weight zero.
 Measurements with_joints_at(const Measurements& data, double later);
+
+/// [s] by which joints are to be taken later for an error to be least: of steps of 20 ms up to half a second either way
+/// the best, then the golden section around it. `error`: of the joints as they were so much later.
+double best_lag(const std::function<double(double)>& error);
 
 }  // namespace truing::model

@@ -144,6 +144,40 @@ TEST_CASE("an instrument that was moved in the middle is found on every arm") {
   check_said(some_arms().front(), many->data, "frame_change", "from row 6125 on");
 }
 
+TEST_CASE("clocks that differ are found of every arm that moves while it is measured") {
+  const std::size_t rows = 600;
+  for (const Robot& robot : some_arms()) {
+    for (const double late : {-0.003, 0.035, 0.0}) {
+      Robot truth = perturbed(robot, 1e-3, 1e-3, 146);
+      truth.T_measurement_base = somewhere();
+      Table table(rows), then(rows);
+      std::vector<double> time;
+      for (std::size_t row = 0; row < rows; ++row) time.push_back(0.02 * static_cast<double>(row));
+      for (std::size_t k = 0; k < robot.driven_count(); ++k) {
+        const auto n = static_cast<double>(k);
+        std::vector<double> read, seen;
+        for (const double t : time) {
+          const auto joint = [n](double at) { return 0.5 * std::sin((1.9 + 0.3 * n) * at + n) + 0.2 * std::cos(at); };
+          read.push_back(joint(t));
+          seen.push_back(joint(t - late));
+        }
+        table.data.joints.push_back(table.add(read));
+        then.data.joints.push_back(then.add(seen));
+      }
+      measure(&then, truth, What::position, 5e-5, 147);
+      table.data.position = then.data.position;
+      table.data.time = table.add(time);
+      CAPTURE(late);
+      if (late == 0.0) {
+        const std::optional<Mistake> said = reviewed(robot, table.data);
+        CHECK((!said || said->kind != "lag"));
+      } else {
+        check_said(robot, table.data, "lag", late > 0.0 ? " ms earlier" : " ms later");
+      }
+    }
+  }
+}
+
 TEST_CASE("a measurement that is missing in the middle is found on every arm") {
   for (const Robot& robot : some_arms()) {
     const auto table = measured(robot, 150, 141);
