@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -251,6 +252,7 @@ void try_readings(const Robot& robot, const DiagnoseOptions& options, double spr
 /// Median error with base and targets fitted to a few rows, with the joints as they were `later` [s].
 double error_of_joints_at(const Robot& robot, const Measurements& data, const DiagnoseOptions& options, double later) {
   const Measurements moved = model::with_joints_at(data, later);
+  if (!model::has_most_rows(moved)) return std::numeric_limits<double>::infinity();
   Measurements some = subset_of(moved, sample_of(moved, kFewRows).rows);
   some.set.assign(some.rows, 0);
   return identify(robot, some, frames_alone(robot, options)).train.after.median;

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <set>
 #include <utility>
 
@@ -170,10 +172,25 @@ class Trials {
     double later, as_is, left;
   };
   std::optional<Lag> lag(const Robot& robot, const Measurements& data) const {
-    const auto error = [&](double later) { return error_later(robot, data, later); };
-    Lag out{best_lag(error), error(0.0), 0.0};
-    out.left = error(out.later);
+    const auto error_later = [&](double later) {
+      const Measurements then = with_joints_at(data, later);
+      return has_most_rows(then) ? error(robot, then) : std::numeric_limits<double>::infinity();
+    };
+    Lag out{best_lag(error_later), error_later(0.0), 0.0};
+    out.left = error_later(out.later);
     if (!(out.left < kBetter * out.as_is)) return {};
+    return out;
+  }
+
+  /// The same, with links as they are found without it: those of `robot` may have been fitted to the lag.
+  std::optional<Lag> lag_apart(const Robot& nominal, const Robot& robot, const Measurements& data) const {
+    constexpr int kRounds = 3;
+    std::optional<Lag> out = lag(robot, data);
+    for (int round = 0; out && round < kRounds; ++round) {
+      const std::optional<Lag> next = lag(everything(nominal, with_joints_at(data, out->later)).robot, data);
+      if (!next || !(next->left < out->left)) break;
+      out = next;
+    }
     return out;
   }
 
@@ -209,17 +226,6 @@ class Trials {
     return frames;
   }
 
-  /// Median error of a few rows with the joints as they were `later` [s], base and targets fitted [m].
-  double error_later(const Robot& robot, const Measurements& data, double later) const {
-    Measurements then = with_joints_at(data, later);
-    std::vector<double> weights(data.rows, 0.0);
-    for (const std::int32_t row : sample_.rows)
-      weights[static_cast<std::size_t>(row)] = then.weight[static_cast<std::size_t>(row)];
-    then.weight = {weights.data(), 1};
-    then.set.assign(data.rows, 0);
-    return identify(robot, then, frames_alone(robot)).train.after.median;
-  }
-
   /// Median error of rows `begin` to `end` with base and targets fitted to these alone [m].
   double error_of(const Robot& robot, const Measurements& data, std::size_t begin, std::size_t end) const {
     std::vector<double> weights(data.rows, 0.0);
@@ -230,9 +236,17 @@ class Trials {
     return identify(robot, part, frames_alone(robot)).train.after.median;
   }
 
+  /// Some rows, without those that do not count.
   Measurements thinned(const Measurements& data) const {
+    const auto weights = std::make_shared<std::vector<double>>(sample_.weights);
+    for (const std::int32_t row : sample_.rows) {
+      const auto at = static_cast<std::size_t>(row);
+      if (data.weight && data.weight[at] == 0.0) (*weights)[at] = 0.0;
+    }
     Measurements out = data;
-    out.weight = {sample_.weights.data(), 1};
+    out.owner = std::make_shared<std::pair<std::shared_ptr<const void>, std::shared_ptr<std::vector<double>>>>(
+        data.owner, weights);
+    out.weight = {weights->data(), 1};
     out.set.assign(data.rows, 0);
     return out;
   }
@@ -344,7 +358,7 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
   for (const Robot* robot : {&found.robot, &nominal}) {
     if (const auto moved = trials.moved_instrument(*robot, data)) return moved_from(*moved, std::move(changes));
     if (!moved_while_measured(data)) continue;
-    if (const auto lag = trials.lag(*robot, data)) return late(*lag, std::move(changes));
+    if (const auto lag = trials.lag_apart(nominal, *robot, data)) return late(*lag, std::move(changes));
   }
   const bool much_left = found.train.after.median > kWorthALook * measured_range(data, fitted_rows(found));
   if (changes.empty() && !much_left && !has_rows_far_out(found)) return std::nullopt;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "math/statistics.hpp"
+#include "model/readings.hpp"
 
 namespace truing {
 namespace model {
@@ -82,38 +83,82 @@ bool moved_while_measured(const Measurements& data) {
   return off < kMidway * kMidway * way;
 }
 
+namespace {
+
+/// The last row that is not later than an instant and has one after it.
+std::size_t row_before(const Measurements& data, double at) {
+  std::size_t low = 0, high = data.rows - 1;
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (data.time[middle] <= at ? low : high) = middle;
+  }
+  return low;
+}
+
+/// Is there a reading on both sides of an instant?
+bool is_between(const Measurements& data, double at, double longest) {
+  if (at < data.time[0] || at > data.time[data.rows - 1]) return false;
+  const std::size_t row = row_before(data, at);
+  return step_after(data, row) < longest || at == data.time[row] || at == data.time[row + 1];
+}
+
+/// A joint's reading and speed at an instant: the cubic through two rows (Hermite).
+struct Moment {
+  double reading, speed;
+};
+
+Moment moment_of(const Measurements& data, const Column& joint, const std::vector<double>& speed, double at) {
+  const std::size_t row = row_before(data, at);
+  const double h = step_after(data, row), u = std::clamp((at - data.time[row]) / h, 0.0, 1.0), v = 1.0 - u;
+  const double q0 = joint[row], q1 = joint[row + 1], d0 = h * speed[row], d1 = h * speed[row + 1];
+  return {v * v * ((1.0 + 2.0 * u) * q0 + u * d0) + u * u * ((1.0 + 2.0 * v) * q1 - v * d1),
+          (6.0 * u * v * (q1 - q0) + v * (v - 2.0 * u) * d0 + u * (u - 2.0 * v) * d1) / h};
+}
+
+}  // namespace
+
 Measurements with_joints_at(const Measurements& data, double later) {
-  const Table speeds = speeds_of(data);
   const double longest = kGap * usual_step(data);
   const std::size_t joints = data.joints.size();
-  auto owned =
-      std::make_shared<Replaced>(Replaced{data.owner, Table(2 * joints + 1, std::vector<double>(data.rows, 0.0))});
+  auto owned = std::make_shared<Replaced>();
+  owned->columns.assign(2 * joints + 1, std::vector<double>(data.rows, 0.0));
   std::vector<double>& weight = owned->columns.back();
-  std::size_t left = 0;  // the last row that is not later than the instant
+  std::vector<std::size_t> like(data.rows);
+  std::size_t last = 0;  // before the first row that has a partner, the first row
   for (std::size_t row = 0; row < data.rows; ++row) {
-    const double at = data.time[row] + later;
-    while (left + 2 < data.rows && data.time[left + 1] <= at) ++left;
-    const double h = step_after(data, left), u = std::clamp((at - data.time[left]) / h, 0.0, 1.0);
-    const double v = 1.0 - u;
-    for (std::size_t k = 0; k < joints; ++k) {
-      const double q0 = data.joints[k][left], q1 = data.joints[k][left + 1];
-      const double d0 = h * speeds[k][left], d1 = h * speeds[k][left + 1];
-      owned->columns[k][row] = v * v * ((1.0 + 2.0 * u) * q0 + u * d0) + u * u * ((1.0 + 2.0 * v) * q1 - v * d1);
-      owned->columns[joints + k][row] = (6.0 * u * v * (q1 - q0) + v * (v - 2.0 * u) * d0 + u * (u - 2.0 * v) * d1) / h;
+    if (is_between(data, data.time[row] + later, longest)) {
+      last = row;
+      weight[row] = data.weight ? data.weight[row] : 1.0;
     }
-    const bool between = at >= data.time[0] && at <= data.time[data.rows - 1] && h < longest;
-    if (between) weight[row] = data.weight ? data.weight[row] : 1.0;
+    like[row] = last;
   }
-  Measurements out = data;
-  const auto of = [&](std::size_t k) { return Column{owned->columns[k].data(), 1}; };
+  const auto first = static_cast<std::size_t>(
+      std::find_if(weight.begin(), weight.end(), [](double w) { return w > 0.0; }) - weight.begin());
+  for (std::size_t row = 0; row < std::min(first, data.rows); ++row) like[row] = first < data.rows ? first : row;
+  const Table speeds = speeds_of(data);
+  for (std::size_t k = 0; k < joints; ++k) {
+    for (std::size_t row = 0; row < data.rows; ++row) {
+      const Moment then = moment_of(data, data.joints[k], speeds[k], data.time[like[row]] + later);
+      owned->columns[k][row] = then.reading;
+      owned->columns[joints + k][row] = then.speed;
+    }
+  }
+  Measurements out = with_rows_paired(data, like, like);
+  owned->rest = out.owner;
   out.joint_speed.resize(joints);
   for (std::size_t k = 0; k < joints; ++k) {
-    out.joints[k] = of(k);
-    out.joint_speed[k] = of(joints + k);
+    out.joints[k] = {owned->columns[k].data(), 1};
+    out.joint_speed[k] = {owned->columns[joints + k].data(), 1};
   }
-  out.weight = of(2 * joints);
+  out.weight = {weight.data(), 1};
   out.owner = owned;
   return out;
+}
+
+bool has_most_rows(const Measurements& data) {
+  std::size_t counted = 0;
+  for (std::size_t row = 0; row < data.rows; ++row) counted += data.weight[row] > 0.0;
+  return 2 * counted >= data.rows;
 }
 
 double best_lag(const std::function<double(double)>& error) {

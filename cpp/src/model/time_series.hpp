@@ -17,11 +17,16 @@ namespace truing::model {
 bool moved_while_measured(const Measurements& data);
 
 /// The data with the joints as they were `later` seconds after each row: cubics through readings and speeds (Hermite).
-/// Speeds as inferred. Rows for which there is no reading on both sides have the weight zero.
+/// Speeds as inferred. Rows for which there is no reading on both sides are the nearest before that has them once more,
+/// with the weight zero.
 Measurements with_joints_at(const Measurements& data, double later);
 
+/// Whether at least half of the rows have a weight.
+bool has_most_rows(const Measurements& data);
+
 /// [s] by which joints are to be taken later for an error to be least: of steps of 20 ms up to half a second either way
-/// the best, then the golden section around it. `error`: of the joints as they were so much later.
+/// the best, then the golden section around it. `error`: of the joints as they were so much later; infinite: nobody
+/// knows.
 double best_lag(const std::function<double(double)>& error);
 
 }  // namespace truing::model
