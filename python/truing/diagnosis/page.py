@@ -1207,13 +1207,13 @@ _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
 def _unit_for(value: float, unit: str) -> tuple[float, str]:
-    """Factor and unit in which `value` is a number people read: rad and m get a prefix, pure numbers become
-    ppm.
+    """Factor and unit in which `value` is a number people read: rad, m and s get a prefix, pure numbers
+    become ppm.
     """
     size = abs(value)
     if unit in ("", "-"):
         return (1e6, "ppm") if 0 < size < 1e-2 else (1.0, "")
-    if not unit.startswith(("rad", "m")) or size == 0:
+    if not (unit.startswith(("rad", "m")) or unit == "s") or size == 0:
         return 1.0, unit
     for factor, prefix in _PREFIXES[1:] if unit[:1] == "m" else _PREFIXES:  # lengths in mm, not in m
         if size * factor >= 0.05:

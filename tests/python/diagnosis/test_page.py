@@ -448,6 +448,8 @@ def test_many_effects_leave_the_first_screen_readable() -> None:
         (0.5, "-", 1.0, ""),
         (2e-5, "1/K", 1.0, "1/K"),
         (0.0, "rad", 1.0, "rad"),
+        (-0.0020007, "s", 1e3, "ms"),
+        (0.12, "s", 1.0, "s"),
     ],
 )
 def test_sizes_have_units_that_people_read(value: float, unit: str, scale: float, shown: str) -> None:
