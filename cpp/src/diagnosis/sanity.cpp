@@ -30,7 +30,8 @@ namespace {
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 constexpr std::size_t kFewRows = 300;
-constexpr double kSmall = 0.1;  ///< of the error that is left
+constexpr std::size_t kRowsOfLag = 4000;
+constexpr double kSmall = 0.02;  ///< of the error that is left: many rows see less than a row's noise
 
 /// What base and targets are fitted by, before statistics.
 IdentifyOptions frames_alone(const Robot& robot, const DiagnoseOptions& options) {
@@ -273,13 +274,12 @@ double beyond_first_order(const Robot& robot, const Measurements& data, double l
 
 /// Clocks of joints and measurement that differ by so much that speeds alone do not say what it does: beyond doubt, and
 /// undone. Less than that is an effect.
-void undo_lag(const Robot& robot, const DiagnoseOptions& options, double spread, Checked* out) {
+void undo_lag(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
   if (!model::moved_while_measured(out->data)) return;
-  const auto error = [&](double later) { return error_of_joints_at(robot, out->data, options, later); };
-  const double as_is = error(0.0);
-  if (!(as_is > kWorthALook * spread)) return;
-  const double later = model::best_lag(error), left = error(later);
-  if (!(left < 0.5 * as_is) || beyond_first_order(robot, out->data, later) < kSmall * left) return;
+  const Measurements some = model::middle_rows(out->data, kRowsOfLag);
+  const auto error = [&](double later) { return error_of_joints_at(robot, some, options, later); };
+  const double later = model::best_lag(error), as_is = error(0.0), left = error(later);
+  if (!(left < 0.5 * as_is) || beyond_first_order(robot, some, later) < kSmall * left) return;
   out->data = model::with_joints_at(out->data, later);
   out->findings.push_back({"lag",
                            "the clocks of joints and measurement differ: what was measured belongs to where the joints "
@@ -329,7 +329,7 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
   std::iota(rows.begin(), rows.end(), 0);
   const double range = measured_range(data, rows);
   const double spread = range > 0.0 ? range : 1.0;
-  undo_lag(robot, options, spread, &out);
+  undo_lag(robot, options, &out);
   infer_speeds(&out);
   try_readings(robot, options, spread, &out);
   infer_directions(&out);

@@ -41,7 +41,8 @@ constexpr double kBetter = 0.5;        ///< a reading that leaves less than this
 constexpr double kAsGood = 1.5;        ///< times the error of the fit as it is, that a reading's own fit may leave
 constexpr std::size_t kTried = 3;      ///< readings refitted, the best first
 constexpr std::size_t kRows = 400;     ///< that readings are compared on
-constexpr int kIterations = 30;        ///< a reading that needs more explains nothing
+constexpr std::size_t kRowsOfLag = 4000;
+constexpr int kIterations = 30;  ///< a reading that needs more explains nothing
 
 /// A link that is another one's misses by a good part of its change, whatever base and tool do: where the robot as
 /// drawn misses by less than this part, it is the fit that went astray, and not the drawing.
@@ -357,8 +358,11 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
   std::vector<Parameter> changes = workshop.changes(found);
   for (const Robot* robot : {&found.robot, &nominal}) {
     if (const auto moved = trials.moved_instrument(*robot, data)) return moved_from(*moved, std::move(changes));
-    if (!moved_while_measured(data)) continue;
-    if (const auto lag = trials.lag_apart(nominal, *robot, data)) return late(*lag, std::move(changes));
+  }
+  if (moved_while_measured(data)) {
+    const Measurements some = middle_rows(data, kRowsOfLag);
+    if (const auto lag = Trials(some, options).lag_apart(nominal, found.robot, some))
+      return late(*lag, std::move(changes));
   }
   const bool much_left = found.train.after.median > kWorthALook * measured_range(data, fitted_rows(found));
   if (changes.empty() && !much_left && !has_rows_far_out(found)) return std::nullopt;

@@ -155,6 +155,32 @@ Measurements with_joints_at(const Measurements& data, double later) {
   return out;
 }
 
+Measurements middle_rows(const Measurements& data, std::size_t most) {
+  if (data.rows <= most) return data;
+  const std::size_t first = (data.rows - most) / 2;
+  Measurements out = data;
+  out.rows = most;
+  std::vector<Column*> columns = {&out.distance,       &out.payload,        &out.temperature, &out.time,
+                                  &out.position_sigma, &out.rotation_sigma, &out.weight};
+  for (auto* block : {&out.joints, &out.direction, &out.joint_speed}) {
+    for (Column& column : *block) columns.push_back(&column);
+  }
+  for (Column& column : out.position) columns.push_back(&column);
+  for (Column& column : out.orientation) columns.push_back(&column);
+  for (auto& named : out.covariates) columns.push_back(&named.second);
+  for (Column* column : columns) {
+    if (*column) column->data += static_cast<std::ptrdiff_t>(first) * column->stride;
+  }
+  const auto cut = [&](auto* numbers) {
+    if (numbers->empty()) return;
+    numbers->erase(numbers->begin(), numbers->begin() + static_cast<std::ptrdiff_t>(first));
+    numbers->resize(most);
+  };
+  for (auto* numbers : {&out.fixed_point, &out.target, &out.pose}) cut(numbers);
+  cut(&out.set);
+  return out;
+}
+
 bool has_most_rows(const Measurements& data) {
   std::size_t counted = 0;
   for (std::size_t row = 0; row < data.rows; ++row) counted += data.weight[row] > 0.0;

@@ -21,6 +21,9 @@ bool moved_while_measured(const Measurements& data);
 /// with the weight zero.
 Measurements with_joints_at(const Measurements& data, double later);
 
+/// At most so many rows that follow each other, from the middle.
+Measurements middle_rows(const Measurements& data, std::size_t most);
+
 /// Whether at least half of the rows have a weight.
 bool has_most_rows(const Measurements& data);
 

@@ -267,3 +267,22 @@ TEST_CASE("joints of another instant are between the rows") {
     }
   }
 }
+
+TEST_CASE("rows from the middle are as they were") {
+  Stream stream(200);
+  Measurements data = stream.measurements();
+  for (std::int32_t row = 0; row < 200; ++row) {
+    data.target.push_back(row % 3);
+    data.set.push_back(static_cast<std::int8_t>(row % 2));
+  }
+  const Measurements some = truing::model::middle_rows(data, 31);
+  REQUIRE(some.rows == 31);
+  CHECK((some.target.size() == 31 && some.set.size() == 31));
+  for (std::size_t row = 0; row < 31; ++row) {
+    CHECK(some.joints[1][row] == stream.q2[84 + row]);
+    CHECK(some.time[row] == stream.time[84 + row]);
+    CHECK(some.target[row] == data.target[84 + row]);
+    CHECK(some.set[row] == data.set[84 + row]);
+  }
+  CHECK(truing::model::middle_rows(data, 200).rows == 200);
+}

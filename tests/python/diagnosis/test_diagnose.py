@@ -354,8 +354,8 @@ def test_speeds_that_were_inferred_serve_the_robot_file() -> None:
     def joints(at: Any) -> Any:
         return np.stack([0.4 * np.sin((0.9 + 0.2 * k) * at + k) - 0.2 * (k == 1) for k in range(6)], axis=1)
 
-    # The tracker's clock is 3 ms late. Seed 20.
-    seen = truing.predict(robot, truing.Measurements(joints(time - 0.003))).position
+    # The tracker's clock is 0.4 ms late. Seed 20.
+    seen = truing.predict(robot, truing.Measurements(joints(time - 0.0004))).position
     noisy = np.asarray(seen) + 3e-5 * np.random.default_rng(20).normal(size=(len(time), 3))
     data = truing.Measurements(joints(time), positions=noisy, time=time)
     result = diagnosed(data)
