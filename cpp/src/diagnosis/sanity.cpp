@@ -275,7 +275,8 @@ double beyond_first_order(const Robot& robot, const Measurements& data, double l
 /// Clocks of joints and measurement that differ by so much that speeds alone do not say what it does: beyond doubt, and
 /// undone. Less than that is an effect.
 void undo_lag(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
-  if (!model::moved_while_measured(out->data)) return;
+  // Own effects may look values up by row, and rows are others here.
+  if (!options.own_effects.empty() || !model::moved_while_measured(out->data)) return;
   const Measurements some = model::middle_rows(out->data, kRowsOfLag);
   const auto error = [&](double later) { return error_of_joints_at(robot, some, options, later); };
   const double later = model::best_lag(error), as_is = error(0.0), left = error(later);

@@ -359,7 +359,7 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
   for (const Robot* robot : {&found.robot, &nominal}) {
     if (const auto moved = trials.moved_instrument(*robot, data)) return moved_from(*moved, std::move(changes));
   }
-  if (moved_while_measured(data)) {
+  if (options.own_effects.empty() && moved_while_measured(data)) {  // which may look values up by row
     const Measurements some = middle_rows(data, kRowsOfLag);
     if (const auto lag = Trials(some, options).lag_apart(nominal, found.robot, some))
       return late(*lag, std::move(changes));
