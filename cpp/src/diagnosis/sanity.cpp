@@ -30,7 +30,6 @@ namespace {
 constexpr double kWorthALook = 0.001, kHardlyAnything = 0.02;
 constexpr std::size_t kRows = 1200;  ///< that the quick comparisons look at
 constexpr std::size_t kFewRows = 300;
-constexpr std::size_t kRowsOfLag = 4000;
 constexpr double kSmall = 0.02;  ///< of the error that is left: many rows see less than a row's noise
 
 /// What base and targets are fitted by, before statistics.
@@ -277,16 +276,13 @@ double beyond_first_order(const Robot& robot, const Measurements& data, double l
 void undo_lag(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
   // Own effects may look values up by row, and rows are others here.
   if (!options.own_effects.empty() || !model::moved_while_measured(out->data)) return;
-  const Measurements some = model::middle_rows(out->data, kRowsOfLag);
+  const Measurements some = model::middle_rows(out->data, model::kRowsOfLag);
   const auto error = [&](double later) { return error_of_joints_at(robot, some, options, later); };
   const double later = model::best_lag(error), as_is = error(0.0), left = error(later);
   if (!(left < 0.5 * as_is) || beyond_first_order(robot, some, later) < kSmall * left) return;
   out->data = model::with_joints_at(out->data, later);
   out->findings.push_back({"lag",
-                           "the clocks of joints and measurement differ: what was measured belongs to where the joints "
-                           "were " +
-                               number(1e3 * std::abs(later), 3) + " ms " + (later > 0.0 ? "later" : "earlier") + " (" +
-                               millimetres(left) + " in place of " + millimetres(as_is) +
+                           model::text_of_lag(later) + " (" + millimetres(left) + " in place of " + millimetres(as_is) +
                                ", by base and tool alone). The diagnosis goes on with joints between the rows, there. "
                                "Correct the file.",
                            {}});

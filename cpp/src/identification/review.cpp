@@ -41,8 +41,7 @@ constexpr double kBetter = 0.5;        ///< a reading that leaves less than this
 constexpr double kAsGood = 1.5;        ///< times the error of the fit as it is, that a reading's own fit may leave
 constexpr std::size_t kTried = 3;      ///< readings refitted, the best first
 constexpr std::size_t kRows = 400;     ///< that readings are compared on
-constexpr std::size_t kRowsOfLag = 4000;
-constexpr int kIterations = 30;  ///< a reading that needs more explains nothing
+constexpr int kIterations = 30;        ///< a reading that needs more explains nothing
 
 /// A link that is another one's misses by a good part of its change, whatever base and tool do: where the robot as
 /// drawn misses by less than this part, it is the fit that went astray, and not the drawing.
@@ -297,55 +296,42 @@ std::string changes_text(const std::vector<Parameter>& changes) {
 }
 
 Mistake explained_by(const Tried& best, double as_is, std::vector<Parameter> changes) {
-  Mistake out;
-  out.kind = best.reading.kind;
-  out.text = best.reading.text + " leaves a median error of " + millimetres(best.error) + " in place of " +
-             millimetres(as_is) + " with base and tool fitted. Correct it and run again";
-  out.text += changes.empty() ? "." : ": as it is, " + changes_text(changes) + ".";
-  out.changes = std::move(changes);
-  return out;
+  const std::string fitted = changes.empty() ? "." : ": as it is, " + changes_text(changes) + ".";
+  return {best.reading.kind,
+          best.reading.text + " leaves a median error of " + millimetres(best.error) + " in place of " +
+              millimetres(as_is) + " with base and tool fitted. Correct it and run again" + fitted,
+          std::move(changes)};
 }
 
 Mistake slipped(const RowSlip& slip, std::vector<Parameter> changes) {
-  Mistake out;
-  out.kind = "row_shift";
-  out.text = text_of(slip) + ": that leaves a median error of " + millimetres(slip.after) +
-             " from there on in place of " + millimetres(slip.before) +
-             " with base and tool fitted. Correct it and run again.";
-  out.changes = std::move(changes);
-  return out;
+  return {"row_shift",
+          text_of(slip) + ": that leaves a median error of " + millimetres(slip.after) + " from there on in place of " +
+              millimetres(slip.before) + " with base and tool fitted. Correct it and run again.",
+          std::move(changes)};
 }
 
 Mistake moved_from(const Trials::Moved& moved, std::vector<Parameter> changes) {
-  Mistake out;
-  out.kind = "frame_change";
-  out.text = text_of(moved.change) + ". With base and tool of its own either part leaves a median error of " +
-             millimetres(moved.apart) + " or less, both together " + millimetres(moved.together) +
-             ". Bring all rows into one frame, or identify the parts by themselves.";
-  out.changes = std::move(changes);
-  return out;
+  return {"frame_change",
+          text_of(moved.change) + ". With base and tool of its own either part leaves a median error of " +
+              millimetres(moved.apart) + " or less, both together " + millimetres(moved.together) +
+              ". Bring all rows into one frame, or identify the parts by themselves.",
+          std::move(changes)};
 }
 
 Mistake late(const Trials::Lag& lag, std::vector<Parameter> changes) {
-  Mistake out;
-  out.kind = "lag";
-  out.text = "the clocks of joints and measurement differ: what was measured belongs to where the joints were " +
-             number(1e3 * std::abs(lag.later), 3) + " ms " + (lag.later > 0.0 ? "later" : "earlier") +
-             ". That leaves a median error of " + millimetres(lag.left) + " in place of " + millimetres(lag.as_is) +
-             " with base and tool fitted. Correct the times of the joints and run again; diagnose goes on without.";
-  out.changes = std::move(changes);
-  return out;
+  return {"lag",
+          text_of_lag(lag.later) + ". That leaves a median error of " + millimetres(lag.left) + " in place of " +
+              millimetres(lag.as_is) +
+              " with base and tool fitted. Correct the times of the joints and run again; diagnose goes on without.",
+          std::move(changes)};
 }
 
 Mistake unexplained(std::vector<Parameter> changes) {
-  Mistake out;
-  out.kind = "unexplained";
-  out.text =
-      changes_text(changes) +
-      ", and no sign, order or unit of columns and no other convention of the links explains it: is it the right "
-      "robot file, and is every link of it right?";
-  out.changes = std::move(changes);
-  return out;
+  return {"unexplained",
+          changes_text(changes) +
+              ", and no sign, order or unit of columns and no other convention of the links explains it: is it the "
+              "right robot file, and is every link of it right?",
+          std::move(changes)};
 }
 
 }  // namespace

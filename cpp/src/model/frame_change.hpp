@@ -31,12 +31,12 @@ struct FrameChange {
 std::optional<FrameChange> find_frame_change(const Positions& predicted, const Positions& measured,
                                              const std::vector<std::int32_t>& rows);
 
+/// The same of data with one frame and one target, and of what a robot predicts less what was measured. `off`:
+/// shape=(n, 3) [m]; NaN: not measured.
+std::optional<FrameChange> find_frame_change(const Measurements& data, const Positions& off);
+
 /// Whether there are positions, and nothing that was measured otherwise.
 bool has_one_frame(const Measurements& data);
-
-/// The same of measured positions of one target, and of what a robot predicts of them less these. `off`: shape=(n, 3)
-/// [m]; NaN: not measured.
-std::optional<FrameChange> find_frame_change(const Measurements& data, const Positions& off);
 
 /// Of the median error with one frame, that each part with its own may leave where the instrument was moved.
 constexpr double kOfTwoFrames = 0.3;

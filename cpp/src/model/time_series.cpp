@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "math/statistics.hpp"
+#include "math/text.hpp"
 #include "model/readings.hpp"
 
 namespace truing {
@@ -196,6 +197,7 @@ double best_lag(const std::function<double(double)>& error) {
     least = here;
     best = later;
   }
+  if (std::abs(best) > kMostLag - 0.5 * kLagStep) return 0.0;
   double low = best - kLagStep, high = best + kLagStep;
   double one = high - kGolden * (high - low), other = low + kGolden * (high - low);
   double at_one = error(one), at_other = error(other);
@@ -215,6 +217,11 @@ double best_lag(const std::function<double(double)>& error) {
     }
   }
   return 0.5 * (low + high);
+}
+
+std::string text_of_lag(double later) {
+  return "the clocks of joints and measurement differ: what was measured belongs to where the joints were " +
+         math::number(1e3 * std::abs(later), 3) + " ms " + (later > 0.0 ? "later" : "earlier");
 }
 
 }  // namespace model

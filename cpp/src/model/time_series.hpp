@@ -6,6 +6,7 @@
 // its row.
 
 #include <functional>
+#include <string>
 
 #include "rooms.hpp"
 #include "truing/model/measurement.hpp"
@@ -27,9 +28,15 @@ Measurements middle_rows(const Measurements& data, std::size_t most);
 /// Whether at least half of the rows have a weight.
 bool has_most_rows(const Measurements& data);
 
+/// Rows that are enough to look for a lag on.
+constexpr std::size_t kRowsOfLag = 4000;
+
 /// [s] by which joints are to be taken later for an error to be least: of steps of 20 ms up to half a second either way
-/// the best, then the golden section around it. `error`: of the joints as they were so much later; infinite: nobody
-/// knows.
+/// the best, then the golden section around it. 0 where the error still falls at the end of these. `error`: of the
+/// joints as they were so much later; infinite: nobody knows.
 double best_lag(const std::function<double(double)>& error);
+
+/// "the clocks of joints and measurement differ: what was measured belongs to where the joints were 35 ms earlier".
+std::string text_of_lag(double later);
 
 }  // namespace truing::model

@@ -268,6 +268,14 @@ TEST_CASE("joints of another instant are between the rows") {
   }
 }
 
+TEST_CASE("a lag is found to microseconds, and none at the end of what is tried") {
+  for (const double lag : {-0.4876, -0.002, 0.0, 0.1234}) {
+    const double found = truing::model::best_lag([lag](double later) { return std::abs(later - lag); });
+    CHECK(std::abs(found - lag) < 1e-5);
+  }
+  CHECK(truing::model::best_lag([](double later) { return std::abs(later - 2.0); }) == 0.0);
+}
+
 TEST_CASE("rows from the middle are as they were") {
   Stream stream(200);
   Measurements data = stream.measurements();
