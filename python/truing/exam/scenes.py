@@ -349,7 +349,7 @@ def draw_effect(
 
 def sized(scene: Scene, hidden: Hidden, view: View, over_noise: float) -> tuple[Hidden, Floats] | None:
     """An effect so large that what is seen of it is `over_noise` times the noise, and how it moves the tips,
-    shape=(n, 3) [m]. None: frames absorb it, or no machine has it so large.
+    shape=(n, 3) [m]. None: frames absorb it, no machine has it so large, or the arm buckles.
     """
     try:
         return _sized(scene, hidden, view, over_noise)

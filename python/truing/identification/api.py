@@ -121,22 +121,21 @@ def residuals(
 def _with_inferred(robot: Robot, data: Measurements, own: Sequence[_core.OwnEffect]) -> Measurements:
     """The data with what the robot's effects need and rows that follow each other show."""
     if _core.lacks_directions(robot, data, own):
-        warnings.warn(
-            "no columns dir1 ...: the approach directions that the robot's effects need were inferred from"
-            " the order of the rows, as if the poses had been driven to one after the other",
-            InputWarning,
-            stacklevel=3,
+        _warn_of_inferred(
+            "dir1 ...: the approach directions that the robot's effects need were inferred from the order of"
+            " the rows, as if the poses had been driven to one after the other"
         )
         data = data.replace(directions=_core.inferred_directions(data))
     if _core.lacks_speeds(robot, data, own):
-        warnings.warn(
-            "no columns qd1 ...: the joint speeds that the robot's effects need were inferred from joints and"
-            " times",
-            InputWarning,
-            stacklevel=3,
+        _warn_of_inferred(
+            "qd1 ...: the joint speeds that the robot's effects need were inferred from joints and times"
         )
         data = data.replace(joint_speeds=_core.inferred_speeds(data))
     return data
+
+
+def _warn_of_inferred(columns: str) -> None:
+    warnings.warn(f"no columns {columns}", InputWarning, stacklevel=4)
 
 
 def _warn_of_rows_beyond(robot: Robot, data: Measurements) -> None:
