@@ -265,7 +265,7 @@ def test_ur10_what_remains_is_far_above_the_scatter(series: str) -> None:
 
 def test_the_deepest_hollow_is_found_where_rows_hardly_see_a_direction() -> None:
     """Halves of these poses have hollows by the wrist's zero, the tool and the base; from the nominal robot
-    some fits ended in another one than from the robot that all poses find, 3 to 6 % less deep."""
+    two of these fits ended in another one than from the robot that all poses find, 5 % less deep."""
     robot, data = loaded("Motoman right, tracker")
     best = truing.identify(robot, data.replace(set=np.zeros(data.rows, np.int8))).robot
     for number in range(12):
