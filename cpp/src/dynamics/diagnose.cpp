@@ -80,26 +80,23 @@ std::vector<FoldGram> held_out_of(const Problem& problem, const Account& account
   return out;
 }
 
-/// The columns that are always in, and the terms of a choice; `choice` becomes that of the part.
+/// The columns that are always in, and the terms of a choice; `choice` becomes that of the part, in the same order.
 TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance, Choice* choice) {
   TorqueDesign out;
-  Choice chosen;
+  const std::vector<int> chosen = choice->groups;
   for (std::size_t g = 0; g < whole.groups.size(); ++g) {
     TorqueGroup group = whole.groups[g];
-    const auto at = std::find(choice->groups.begin(), choice->groups.end(), static_cast<int>(g));
+    const auto at = std::find(chosen.begin(), chosen.end(), static_cast<int>(g));
     const bool always = std::find(nuisance.begin(), nuisance.end(), group.columns.front()) != nuisance.end();
-    if (!always && at == choice->groups.end()) continue;
-    if (at != choice->groups.end()) {
-      chosen.groups.push_back(static_cast<int>(out.groups.size()));
-      chosen.scales.push_back(choice->scales[static_cast<std::size_t>(at - choice->groups.begin())]);
-    }
+    if (!always && at == chosen.end()) continue;
+    if (at != chosen.end())
+      choice->groups[static_cast<std::size_t>(at - chosen.begin())] = static_cast<int>(out.groups.size());
     for (int& column : group.columns) {
       out.terms.push_back(whole.terms[static_cast<std::size_t>(column)]);
       column = static_cast<int>(out.terms.size()) - 1;
     }
     out.groups.push_back(std::move(group));
   }
-  *choice = chosen;
   return out;
 }
 
@@ -259,18 +256,19 @@ constexpr double kLeastGainOfFunctions = 0.05;  ///< a free function bends to an
 constexpr int kMostFunctions = 6;               ///< more of them are no answer that anybody reads
 
 /// Beside what was named, free functions of what may drive an unknown effect. What was fitted and is too small to be
-/// named makes room: it may be what little a law can do for something that nobody knows.
+/// named makes room: it may be what little a law can do for something that nobody knows. It is `small` of the account.
 Account with_functions(const Problem& problem, const Account& of_effects, const TorqueModel& model,
                        const SearchLimits& limits, std::vector<Noise>* noise) {
-  Choice choice = likely_of(of_effects);
+  Choice fitted = of_effects.choice;
   const std::vector<int>& always = of_effects.search->evidence().nuisance();
-  auto design = std::make_shared<TorqueDesign>(part_of(*of_effects.design, always, &choice));
+  auto design = std::make_shared<TorqueDesign>(part_of(*of_effects.design, always, &fitted));
   std::vector<int> nuisance;
   for (std::size_t g = 0; g < design->groups.size(); ++g) {
     const std::vector<int>& columns = design->groups[g].columns;
-    if (std::find(choice.groups.begin(), choice.groups.end(), static_cast<int>(g)) == choice.groups.end())
+    if (std::find(fitted.groups.begin(), fitted.groups.end(), static_cast<int>(g)) == fitted.groups.end())
       nuisance.insert(nuisance.end(), columns.begin(), columns.end());
   }
+  const auto [choice, small] = likely_and_small(of_effects, fitted);
   add_free_functions(problem.robot, problem.range, design.get());
   const DesignColumns columns(problem.tiles, *design);
   const TorqueGrams grams = sum_grams(columns, problem.nominal, model, problem.train);
@@ -285,6 +283,7 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   out.choice = out.search->run(choice, of_functions, true);
   out.held_out = held_out_of(problem, out, model, *noise);
   out.choice = without_functions_that_fail(out, of_functions.least_gain);
+  out.small = small;
   out.inertias_given = of_effects.inertias_given;
   return out;
 }

@@ -731,16 +731,31 @@ Choice without_functions_that_fail(Account account, double least_gain) {
   }
 }
 
-Choice likely_of(const Account& account) {
+std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice& same) {
   const Naming naming(account);
-  Choice out;
-  for (std::size_t k = 0; k < account.choice.groups.size(); ++k) {
-    if (!naming.is_likely(k)) continue;
-    out.groups.push_back(account.choice.groups[k]);
-    out.scales.push_back(account.choice.scales[k]);
+  Choice likely, small;
+  for (std::size_t k = 0; k < same.groups.size(); ++k) {
+    Choice& to = naming.is_likely(k) ? likely : small;
+    to.groups.push_back(same.groups[k]);
+    to.scales.push_back(same.scales[k]);
   }
-  return out;
+  return {likely, small};
 }
+
+namespace {
+
+/// The robot with all that was fitted, also what is too small to be named, and the free functions beside it.
+TorqueModel model_with_functions(const Problem& problem, Account functions) {
+  Choice& all = functions.choice;
+  all.groups.insert(all.groups.end(), functions.small.groups.begin(), functions.small.groups.end());
+  all.scales.insert(all.scales.end(), functions.small.scales.begin(), functions.small.scales.end());
+  const Naming naming(functions);
+  std::vector<std::string> said_already;
+  const Robot robot = robot_of(problem, functions, naming, &said_already);
+  return with_free_functions(problem, robot, *functions.design, naming.fit());
+}
+
+}  // namespace
 
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
                       const std::vector<Noise>& noise, const Account& functions,
@@ -761,11 +776,9 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.covariance = covariance_of(*account.design, naming.fit(), parameters_in(out.effects));
   // Errors are those of the robot that is handed over.
   out.robot = robot_of(problem, account, naming, &out.warnings);
-  std::vector<std::string> said_already;
-  const Robot beside = robot_of(problem, functions, all, &said_already);
   const TorqueModel model = model_of(out.robot, problem);
   // Functions of the load were fitted over the torque of what was named.
-  const TorqueModel with_unknown = with_free_functions(problem, beside, *functions.design, all.fit()).seeing(model);
+  const TorqueModel with_unknown = model_with_functions(problem, functions).seeing(model);
   out.errors = errors_of(
       problem,
       {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}, {"with_unknown", with_unknown}});
@@ -783,6 +796,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
     for (FoundTorqueEffect& e : out.effects)
       if (!e.standard) e.probability = std::min(e.probability, kContradicted);
     for (UnknownTorque& u : out.unknown) u.probability = std::min(u.probability, kContradicted);
+    std::vector<std::string> said_already;
     out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, false, &said_already);
   }
   out.where = regimes_of(problem, groundwork.model, model);

@@ -18,8 +18,9 @@ Choice without_what_hides(Account account);
 /// hundreds that were tried bend to a few folds by chance.
 Choice without_functions_that_fail(Account account, double least_gain);
 
-/// Of an account's choice, what is likely enough to be named.
-Choice likely_of(const Account& account);
+/// Of an account's choice, what is likely enough to be named, and what is too small for it. `same`: the choice, in the
+/// numbers that the answer has.
+std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice& same);
 
 /// `functions`: the account with free functions beside what was named. Noise is that of either.
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,

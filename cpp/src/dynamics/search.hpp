@@ -124,6 +124,7 @@ struct Account {
   std::shared_ptr<const Sums> sums;
   std::shared_ptr<const Search> search;
   Choice choice{};
+  Choice small{};                       ///< fitted beside what was chosen, and too small to be named
   bool inertias_given = false;          ///< links' inertias are the file's, but for those that were chosen
   std::vector<FoldGram> held_out = {};  ///< recordings that nothing was fitted to: of what was chosen alone
 };

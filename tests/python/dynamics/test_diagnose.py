@@ -156,6 +156,8 @@ def test_ur10e_held_out_torque_and_the_payload_that_nobody_told() -> None:
     found = diagnose(robot, load_recordings(free, robot))
     assert set(found.held_out) == {"h7_20s", "h12_40s"}
     assert (percent(found, "named") < [7.0, 3.5, 3.5, 6.5, 11.0, 8.5]).all()
+    # Functions come beside all that was fitted, also what is too small to be named: without it J2 is 4 % off.
+    assert (percent(found, "with_unknown") < 1.15 * percent(found, "named")).all()
     names = named_at_joints(found)
     assert {("load_friction", "elbow_joint"), ("load_friction", "shoulder_lift_joint")} <= names
     for wrist in ("wrist_1_joint", "wrist_2_joint", "wrist_3_joint"):
