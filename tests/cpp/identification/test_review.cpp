@@ -177,7 +177,7 @@ TEST_CASE("clocks that differ are found of every arm that moves while it is meas
         const double found = std::stod(text.substr(text.find("were ") + 5));
         CHECK(found == doctest::Approx(1e3 * std::abs(late)).epsilon(0.02));
         if (std::abs(late) > 0.01) continue;
-        IdentifyOptions options;  // who asks for the effect has found it
+        truing::IdentifyOptions options;  // who asks for the effect has found it
         options.effects = {{"time_offset", {}}};
         const Measurements with_speeds = truing::with_inferred_speeds(table.data);
         const Identification fit = truing::identify(robot, with_speeds, options);
