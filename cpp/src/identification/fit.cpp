@@ -50,12 +50,6 @@ namespace {
 
 using kernel::RowLoss;
 
-SolverSummary solve(const Job& job, const Evaluator& evaluator, const Weighing& weighing, const Refit& refit,
-                    Eigen::VectorXd* values) {
-  return job.options.solver == Solver::ceres ? solve_with_ceres(evaluator, job.model, weighing, job.options, values)
-                                             : levenberg_marquardt(evaluator, weighing, job.options, refit, values);
-}
-
 /// The measurement frame refitted to the current predictions by SVD.
 Refit frame_by_registration(const Model& model, const Measurements& data, const Evaluator& evaluator,
                             std::vector<std::int32_t> rows) {
@@ -76,6 +70,42 @@ Refit frame_by_registration(const Model& model, const Measurements& data, const 
     for (int k = 0; k < 6; ++k) (*values)[model.parameter_index(names[k])] = k < 3 ? base.translation()[k] : rpy[k - 3];
   };
 }
+
+/// Some of a job's rows, to be solved for what is fitted.
+class Equations {
+ public:
+  Equations(const Job& job, const std::vector<int>& fitted, const std::vector<std::int32_t>& rows)
+      : job_(job),
+        evaluator_(job.model, job.data, job.bases, make_segments(job.data, rows), fitted, job.options.threads) {
+    const bool base =
+        std::any_of(fitted.begin(), fitted.end(), [&](int k) { return job.model.parameters[k].role == Role::base; });
+    if (base && job.options.frame_by == FrameBy::svd)
+      refit_ = frame_by_registration(job.model, job.data, evaluator_, rows);
+  }
+  Equations(const Equations&) = delete;
+  Equations& operator=(const Equations&) = delete;
+
+  /// Solved from where the fit stands; iterations are added up.
+  void solve(Fit* fit) const {
+    const int before = fit->solver.iterations;
+    fit->solver = job_.options.solver == Solver::ceres
+                      ? solve_with_ceres(evaluator_, job_.model, fit->weighing, job_.options, &fit->values)
+                      : levenberg_marquardt(evaluator_, fit->weighing, job_.options, refit_, &fit->values);
+    fit->solver.iterations += before;
+  }
+
+  /// Lengths of the residuals, by row of the data; 0 of other rows.
+  std::vector<double> norms(const Fit& fit) const {
+    std::vector<double> out(job_.data.rows, 0.0);
+    evaluator_.residual_norms(fit.values, fit.weighing, &out);
+    return out;
+  }
+
+ private:
+  const Job& job_;
+  Evaluator evaluator_;
+  Refit refit_;
+};
 
 /// Rows whose residual is longer than `beyond` medians.
 std::vector<std::int32_t> gross_outliers(const Job& job, const std::vector<double>& norms, double beyond) {
@@ -134,6 +164,38 @@ namespace {
 /// rejection finds back from. Whether the row stays out is decided by the fit that starts without it.
 constexpr double kImpossible = 20.0;
 
+/// Noise of a unit-weight component, as given or as a fit without priors leaves it.
+double noise_against_priors(const Equations& equations, const Equations& all, const Job& job, Fit without_priors) {
+  if (job.options.prior_noise > 0.0) return job.options.prior_noise;
+  equations.solve(&without_priors);
+  return noise_of(job, without_priors.fitted, all.norms(without_priors));
+}
+
+/// A robust loss at a scale of the residuals' own, until that has settled.
+void robust_rounds(const Equations& all, const Job& job, Loss loss, int rounds, double settled, Fit* out) {
+  for (int round = 0; round < rounds; ++round) {
+    const std::vector<double> norms = all.norms(*out);
+    std::vector<double> of_rows;
+    for (const std::int32_t row : job.rows) of_rows.push_back(norms[row]);
+    const double scale = loss_medians(loss) * median_of(std::move(of_rows));
+    if (!(scale > 0.0) || (round > 0 && std::abs(scale / out->weighing.loss_scale - 1.0) < settled)) break;
+    out->weighing.loss = row_loss(loss);
+    out->weighing.loss_scale = scale;
+    all.solve(out);
+  }
+}
+
+/// Gross outliers are left out, and found again, until they are the same.
+void rejecting_rounds(const Equations& all, const Job& job, Fit* out) {
+  constexpr int kRounds = 10;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::int32_t> rejected = gross_outliers(job, all.norms(*out), job.options.reject_beyond);
+    if (round > 0 && rejected == out->rejected) break;
+    out->rejected = std::move(rejected);
+    Equations(job, out->fitted, without(job.rows, out->rejected)).solve(out);
+  }
+}
+
 }  // namespace
 
 Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start) {
@@ -141,79 +203,28 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   out.values = start;
   out.fitted = fitted;
   out.weighing.rotation_scale = job.options.rotation_length;
-  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), fitted,
-                            job.options.threads);
-  const bool by_svd = job.options.frame_by == FrameBy::svd && std::any_of(fitted.begin(), fitted.end(), [&](int k) {
-                        return job.model.parameters[k].role == Role::base;
-                      });
-  const auto refit_on = [&](const Evaluator& of_rows, const std::vector<std::int32_t>& rows) {
-    return by_svd ? frame_by_registration(job.model, job.data, of_rows, rows) : Refit();
-  };
-  const Refit refit = refit_on(evaluator, job.rows);
-  std::vector<double> norms(job.data.rows, 0.0);
+  const Equations all(job, fitted, job.rows);
   std::vector<std::int32_t> possible = job.rows;
-  if (job.options.loss != Loss::none) {
-    evaluator.residual_norms(out.values, out.weighing, &norms);
-    possible = without(job.rows, gross_outliers(job, norms, kImpossible));
-  }
+  if (job.options.loss != Loss::none) possible = without(job.rows, gross_outliers(job, all.norms(out), kImpossible));
   const bool all_possible = possible.size() == job.rows.size();
-  std::optional<Evaluator> some;
-  if (!all_possible)
-    some.emplace(job.model, job.data, job.bases, make_segments(job.data, possible), fitted, job.options.threads);
-  const Evaluator& first = some ? *some : evaluator;
-  const auto solve_possible = [&] { return solve(job, first, out.weighing, refit_on(first, possible), &out.values); };
-  double noise = job.options.prior_noise;
-  if (!job.options.priors.empty() && !(noise > 0.0)) {
-    solve_possible();
-    evaluator.residual_norms(out.values, out.weighing, &norms);
-    noise = noise_of(job, fitted, norms);
-    out.values = start;
-  }
-  if (!job.options.priors.empty()) out.weighing.prior = prior_of(job, fitted, noise);
-  out.solver = solve_possible();
+  std::optional<Equations> some;
+  if (!all_possible) some.emplace(job, fitted, possible);
+  const Equations& first = some ? *some : all;
+  if (!job.options.priors.empty())
+    out.weighing.prior = prior_of(job, fitted, noise_against_priors(first, all, job, out));
+  first.solve(&out);
   if (job.options.loss == Loss::none) return out;
-
-  const auto median_norm = [&] {
-    evaluator.residual_norms(out.values, out.weighing, &norms);
-    std::vector<double> of_rows;
-    for (const std::int32_t row : job.rows) of_rows.push_back(norms[row]);
-    return median_of(std::move(of_rows));
-  };
-  int iterations = out.solver.iterations;
-  const auto robust_rounds = [&](RowLoss loss, double medians, int rounds, double settled) {
-    for (int round = 0; round < rounds; ++round) {
-      const double scale = medians * median_norm();
-      if (!(scale > 0.0) || (round > 0 && std::abs(scale / out.weighing.loss_scale - 1.0) < settled)) break;
-      out.weighing.loss = loss;
-      out.weighing.loss_scale = scale;
-      out.solver = solve(job, evaluator, out.weighing, refit, &out.values);
-      iterations += out.solver.iterations;
-    }
-  };
   if (job.options.loss != Loss::reject) {
-    robust_rounds(row_loss(job.options.loss), loss_medians(job.options.loss), 10, 1e-3);
-    out.solver.iterations = iterations;
+    robust_rounds(all, job, job.options.loss, 10, 1e-3, &out);
     return out;
   }
-
-  evaluator.residual_norms(out.values, out.weighing, &norms);
-  if (gross_outliers(job, norms, job.options.reject_beyond).empty()) {
-    if (!all_possible) out.solver = solve(job, evaluator, out.weighing, refit, &out.values);
+  if (gross_outliers(job, all.norms(out), job.options.reject_beyond).empty()) {
+    if (!all_possible) all.solve(&out);
     return out;
   }
-  robust_rounds(RowLoss::cauchy, loss_medians(Loss::cauchy), 3, 1e-2);
+  robust_rounds(all, job, Loss::cauchy, 3, 1e-2, &out);
   out.weighing.loss = RowLoss::none;
-  for (int round = 0; round < 10; ++round) {
-    evaluator.residual_norms(out.values, out.weighing, &norms);
-    std::vector<std::int32_t> rejected = gross_outliers(job, norms, job.options.reject_beyond);
-    if (round > 0 && rejected == out.rejected) break;
-    out.rejected = std::move(rejected);
-    const std::vector<std::int32_t> kept = without(job.rows, out.rejected);
-    const Evaluator clean(job.model, job.data, job.bases, make_segments(job.data, kept), fitted, job.options.threads);
-    out.solver = solve(job, clean, out.weighing, refit_on(clean, kept), &out.values);
-    iterations += out.solver.iterations;
-  }
-  out.solver.iterations = iterations;
+  rejecting_rounds(all, job, &out);
   return out;
 }
 
