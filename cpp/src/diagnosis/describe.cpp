@@ -518,7 +518,7 @@ std::vector<Candidate> list_candidates(const Work& work, const Evidence& evidenc
     c.effect = named[g].effect;
     c.joints = named[g].joints;
     c.columns = first[g].rank;
-    c.gain = first[g].squares / std::max(all.sigma2, 1e-300);
+    c.gain = first[g].squares;  // weights have made noise the unit
     c.evidence = first[g].score;
     if (!groups[g].columns.empty()) {
       Choice alone;

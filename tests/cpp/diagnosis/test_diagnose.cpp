@@ -410,6 +410,18 @@ TEST_CASE("of few poses one value far off among many that are about right is fou
         1.05 * fresh_error(truing::identify(light_arm(), table->data).robot, truth, 643));
 }
 
+TEST_CASE("gains of candidates are in units of the noise, also where everything at once leaves nothing") {
+  Robot truth = light_arm();
+  truth.joints[2].theta += 1e-3;
+  const auto table = measured(truth, 20, 645);
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  const double most = 2.0 * static_cast<double>(table->data.rows) * std::pow(d.gap.rms / d.noise_floor, 2.0) * 3.0;
+  double largest = 0.0;
+  for (const truing::Candidate& c : d.candidates) largest = std::max(largest, c.gain);
+  CHECK(largest > 20.0);
+  CHECK(largest < most);
+}
+
 TEST_CASE("of few poses wrong links are believed before names that were chosen among many") {
   for (const unsigned seed : {951u, 971u, 981u}) {
     const Robot truth = perturbed(light_arm(), 6e-5, 6e-5, seed);
