@@ -22,7 +22,7 @@ constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth anothe
 constexpr double kNoChance = 1.5;     ///< sums of squares that noise alone does not make so unequal
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
 constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
-constexpr double kWholly = 0.95;      ///< of a function, that a plain shape makes: then it is that shape
+constexpr double kWholly = 0.95;      ///< of a function, that a law or a plain shape makes: then it is that
 
 const EffectTraits& effect_traits(const Work& work, const Explanation& e) {
   return model::traits_of(e.effect, work.given.options.own_effects);
@@ -129,7 +129,8 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
 }
 
 /// Of the motion that a law and its correction make together, the part that the plain law must make to keep its name.
-/// What a joint does with its own angle can be anything: there the bar is higher, and no plainer shape may do better.
+/// What a joint does with its own angle can be anything: there the bar is higher, and no plainer shape may do better,
+/// unless the law makes the function wholly.
 static double least_share_of_law(const EffectTraits& traits) { return follows_own_angle(traits) ? 0.75 : 0.65; }
 
 static std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
@@ -328,7 +329,7 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
     const double share = gain.squares / std::max(together, 1e-300);
     const EffectTraits& traits = effect_traits(work, e);
     const bool plainer =
-        (of_angle ? follows_configuration(traits) : follows_own_angle(traits)) && of_shape > std::max(share, kWholly);
+        (of_angle ? follows_configuration(traits) : follows_own_angle(traits)) && share < kWholly && of_shape > kWholly;
     if (!plainer && share > least_share_of_law(traits) && gain.score > best.score) {
       best = gain;
       best.group = static_cast<int>(g);

@@ -41,6 +41,15 @@ def test_an_end_stop_is_no_zero_ratio_and_harmonic_at_once() -> None:
     assert [(u.joint, u.inputs) for u in found.unknown] == [("B3", ("q3",))]
 
 
+@pytest.mark.parametrize(("number", "effect", "joint"), [(1, "harmonic", "J1"), (5, "gear_ratio", "A5")])
+def test_a_law_that_makes_a_joints_function_wholly_is_named(number: int, effect: str, joint: str) -> None:
+    """By 96 and 99 %: a corner makes 97 and 99.9 %, and it was unknown."""
+    robot, data, _ = make(f"examination/companion/{number}@25")
+    found = truing.diagnose(robot, data)
+    assert (effect, (joint,)) in [(e.effect, e.joints) for e in found.effects]
+    assert joint not in [u.joint for u in found.unknown]
+
+
 @pytest.mark.realdata
 @pytest.mark.filterwarnings("ignore::truing.InputWarning")
 def test_held_out_errors_that_nearly_double_are_not_explained_by_chance() -> None:
