@@ -1561,9 +1561,10 @@ class Mistake:
     @property
     def kind(self) -> str:
         """
-        'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit', 'row_shift' or 'convention':
-        reading it otherwise explains the measurements; 'frame_change': two frames do; 'lag': joints of an
-        instant before or after do; 'unexplained': nothing of this does.
+        'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'handedness', 'link_unit', 'row_shift',
+        'convention', 'orientation_order', 'orientation_inverse' or 'pose_inverse': reading it otherwise
+        explains the measurements; 'frame_change': two frames do; 'lag': joints of an instant before or
+        after do; 'unexplained': nothing of this does.
         """
     @property
     def text(self) -> str:
@@ -2662,9 +2663,10 @@ class SanityFinding:
     @property
     def kind(self) -> str:
         """
-        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'length_unit', 'link_unit', 'row_shift',
-        'convention', 'frame_change', 'gravity_direction', 'duplicates', 'direction', 'speed', 'lag',
-        'moved_target', 'constant' or 'outliers'.
+        'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'length_unit', 'handedness', 'link_unit',
+        'row_shift', 'convention', 'orientation_order', 'orientation_inverse', 'pose_inverse',
+        'frame_change', 'gravity_direction', 'duplicates', 'direction', 'speed', 'lag', 'moved_target',
+        'constant' or 'outliers'.
         """
     @property
     def mistake(self) -> bool:

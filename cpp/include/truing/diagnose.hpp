@@ -154,9 +154,9 @@ struct Candidate {
 
 /// What looks wrong with the data themselves.
 struct SanityFinding {
-  /// 'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'length_unit', 'link_unit', 'row_shift', 'convention',
-  /// 'frame_change', 'gravity_direction', 'duplicates', 'direction', 'speed', 'lag', 'moved_target', 'constant' or
-  /// 'outliers'.
+  /// 'joint_record', 'joint_order', 'joint_sign', 'joint_unit', 'length_unit', 'handedness', 'link_unit', 'row_shift',
+  /// 'convention', 'orientation_order', 'orientation_inverse', 'pose_inverse', 'frame_change', 'gravity_direction',
+  /// 'duplicates', 'direction', 'speed', 'lag', 'moved_target', 'constant' or 'outliers'.
   std::string kind;
   std::string text;               ///< a sentence with what to do
   std::vector<std::size_t> rows;  ///< rows (counted from 0) that it is about, if few

@@ -15,9 +15,10 @@ namespace truing {
 
 /// What speaks against the robot file or the columns that were handed to `identify`.
 struct Mistake {
-  /// 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'link_unit', 'row_shift' or 'convention': reading it
-  /// otherwise explains the measurements; 'frame_change': two frames do; 'lag': joints of an instant before or after
-  /// do; 'unexplained': nothing of this does.
+  /// 'joint_sign', 'joint_order', 'joint_unit', 'length_unit', 'handedness', 'link_unit', 'row_shift', 'convention',
+  /// 'orientation_order', 'orientation_inverse' or 'pose_inverse': reading it otherwise explains the measurements;
+  /// 'frame_change': two frames do; 'lag': joints of an instant before or after do; 'unexplained': nothing of this
+  /// does.
   std::string kind;
   std::string text;  ///< what is wrong, and what to do, in sentences
   /// What changed by more than a workshop makes, most first: 10 mm or 2 % of the robot's reach if that is more, 3
@@ -32,8 +33,9 @@ struct Mistake {
 /// units of angles and lengths, the Denavit-Hartenberg convention. Each is undone, base and targets are fitted, and one
 /// that halves the error is the likely mistake if the refit under it changes no link as much.
 ///
-/// Before that, an instrument that was moved, clocks that differ where the robot moved while it was measured, and a row
-/// that is missing in the middle or measured twice, are looked for.
+/// Before that, orientations that are scalar last, turned round or of inverse poses, an instrument that was moved,
+/// clocks that differ where the robot moved while it was measured, and a row that is missing in the middle or measured
+/// twice, are looked for.
 ///
 /// `found`: by identify(nominal, data, options). Empty: nothing speaks against it.
 std::optional<Mistake> review(const Robot& nominal, const Measurements& data, const Identification& found,

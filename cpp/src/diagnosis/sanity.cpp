@@ -213,6 +213,23 @@ void undo_slip(const Robot& robot, const DiagnoseOptions& options, Checked* out)
   out->findings.push_back(finding);
 }
 
+/// Orientations that were read wrongly: then no effect can be named before it is corrected.
+bool find_turned(const Robot& robot, const DiagnoseOptions& options, Checked* out) {
+  const RowSample sample = sample_of(out->data, kRows);
+  IdentifyOptions every_row = frames_alone(robot, options);
+  every_row.loss = Loss::none;  // what rejects most rows fits the rest under any reading
+  const auto errors = [&](const Measurements& read) {
+    Measurements some = read;
+    some.weight = {sample.weights.data(), 1};
+    some.set.assign(some.rows, 0);
+    return identify(robot, some, every_row).train.after;
+  };
+  if (!out->data.orientation[0]) return false;
+  const auto better = better_orientations(robot, out->data, errors);
+  if (better) out->findings.push_back({better->reading.kind, text_of(*better) + ".", {}, true});
+  return better.has_value();
+}
+
 /// Does another reading explain more? Columns of the wrist cost least: they are looked at from `kWorthALook` of the
 /// measured range on, and what nothing explains is said from `kHardlyAnything` on. A mistake is what halves the error
 /// with the geometry fitted, too: then no effect can be named before it is corrected.
@@ -328,7 +345,7 @@ Checked check(const Robot& robot, const Measurements& data, const DiagnoseOption
   const double spread = range > 0.0 ? range : 1.0;
   undo_lag(robot, options, &out);
   infer_speeds(&out);
-  try_readings(robot, options, spread, &out);
+  if (!find_turned(robot, options, &out)) try_readings(robot, options, spread, &out);
   infer_directions(&out);
   return out;
 }

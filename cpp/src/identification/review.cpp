@@ -148,6 +148,21 @@ class Trials {
     return identify(robot, thinned(data), frames_alone(robot)).train.after.median;
   }
 
+  /// Another reading of the orientations that agrees with the robot, where these do not.
+  std::optional<BetterOrientations> orientations(const Robot& robot, const Measurements& data) const {
+    IdentifyOptions every_row = frames_alone(robot);
+    every_row.loss = Loss::none;  // what rejects most rows fits the rest under any reading
+    return better_orientations(robot, data, [&](const Measurements& read) {
+      try {
+        return identify(robot, thinned(read), every_row).train.after;
+      } catch (const std::invalid_argument&) {  // nothing can be found under this reading
+        ErrorStatistics none;
+        none.rotation_rms = kNaN;
+        return none;
+      }
+    });
+  }
+
   /// From where on everything was measured in another frame, if it was; `robot`: as found. With it the median errors of
   /// all rows with one base and targets, and of the part that is worse with its own [m].
   struct Moved {
@@ -326,6 +341,10 @@ Mistake late(const Trials::Lag& lag, std::vector<Parameter> changes) {
           std::move(changes)};
 }
 
+Mistake turned(const BetterOrientations& better, std::vector<Parameter> changes) {
+  return {better.reading.kind, text_of(better) + ".", std::move(changes)};
+}
+
 Mistake unexplained(std::vector<Parameter> changes) {
   return {"unexplained",
           changes_text(changes) +
@@ -342,6 +361,9 @@ std::optional<Mistake> review(const Robot& nominal, const Measurements& data, co
   const Workshop workshop(nominal, data);
   const Trials trials(data, options);
   std::vector<Parameter> changes = workshop.changes(found);
+  if (found.train.after.rotation_rms > kAngle) {
+    if (const auto better = trials.orientations(nominal, data)) return turned(*better, std::move(changes));
+  }
   for (const Robot* robot : {&found.robot, &nominal}) {
     if (const auto moved = trials.moved_instrument(*robot, data)) return moved_from(*moved, std::move(changes));
   }

@@ -4,12 +4,15 @@
 #include "model/readings.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 
 #include "math/constants.hpp"
+#include "math/text.hpp"
 
 namespace truing::model {
 namespace {
@@ -48,6 +51,56 @@ Measurements with_lengths(const Measurements& data, double factor) {
   }
   out.owner = owned;
   return out;
+}
+
+using Quaternion = Eigen::Quaterniond;
+using Position = Eigen::Vector3d;
+
+/// The data with the pose of every row that has one, position and orientation, changed in place by `change`. Rows of
+/// positions alone are as they were.
+Measurements with_poses(const Measurements& data, const std::function<void(Position*, Quaternion*)>& change) {
+  Measurements out = data;
+  auto owned = std::make_shared<OtherColumns>();
+  owned->rest = data.owner;
+  for (const Column& column : data.position) owned->columns.push_back(copy_of(column, data.rows));
+  for (const Column& column : data.orientation) owned->columns.push_back(copy_of(column, data.rows));
+  auto& of = owned->columns;
+  for (std::size_t row = 0; row < data.rows; ++row) {
+    if (!data.has_orientation(row)) continue;
+    Position p(of[0][row], of[1][row], of[2][row]);
+    Quaternion q(of[3][row], of[4][row], of[5][row], of[6][row]);
+    change(&p, &q);
+    for (std::size_t k = 0; k < 3; ++k) of[k][row] = p[static_cast<Eigen::Index>(k)];
+    of[3][row] = q.w();
+    for (std::size_t k = 0; k < 3; ++k) of[4 + k][row] = q.vec()[static_cast<Eigen::Index>(k)];
+  }
+  for (std::size_t k = 0; k < 3; ++k) out.position[k] = {of[k].data(), 1};
+  for (std::size_t k = 0; k < 4; ++k) out.orientation[k] = {of[3 + k].data(), 1};
+  out.owner = owned;
+  return out;
+}
+
+/// The other hand's frame: its y axis points the other way.
+Measurements mirrored(const Measurements& data) {
+  Measurements out = data;
+  auto owned = std::make_shared<OtherColumns>();
+  owned->rest = data.owner;
+  owned->columns.reserve(3);
+  for (Column* column : {&out.position[1], &out.orientation[1], &out.orientation[3]}) {
+    if (!*column) continue;
+    owned->columns.push_back(copy_of(*column, data.rows, -1.0));
+    *column = {owned->columns.back().data(), 1};
+  }
+  out.owner = owned;
+  return out;
+}
+
+/// Of columns that are scalar last under the names of scalar first.
+void scalar_last(Position* /*p*/, Quaternion* q) { *q = Quaternion(q->z(), q->w(), q->x(), q->y()); }
+void turned_round(Position* /*p*/, Quaternion* q) { *q = q->conjugate(); }
+void inverted(Position* p, Quaternion* q) {
+  *q = q->conjugate();
+  *p = -(*q * *p);
 }
 
 using Readings = std::vector<std::function<Reading()>>;
@@ -106,6 +159,11 @@ void add_unit_readings(const Robot& robot, const Measurements& data, Readings* o
     });
   }
   if (!data.position[0] && !data.distance) return;
+  if (data.position[0]) {
+    out->push_back([&robot, &data] {
+      return Reading{robot, mirrored(data), "handedness", "reading the measured positions in a left-handed frame"};
+    });
+  }
   const std::pair<double, const char*> lengths[] = {
       {1e-3, "mm instead of m"}, {1e3, "m instead of mm"}, {0.0254, "in instead of m"}, {25.4, "in instead of mm"}};
   for (const auto& length : lengths) {
@@ -214,6 +272,50 @@ RowSample sample_of(const Measurements& data, std::size_t most) {
     if (out.weights[row] > 0.0) out.rows.push_back(static_cast<std::int32_t>(row));
   }
   return out;
+}
+
+std::optional<BetterOrientations> better_orientations(
+    const Robot& robot, const Measurements& data, const std::function<ErrorStatistics(const Measurements&)>& errors) {
+  constexpr double kWrong = 5.0 * kDegree;  // more than a robot or an instrument is off
+  constexpr double kBetter = 0.25;
+  constexpr double kOfRange = 0.02;  // positions must go with the robot as well
+  struct Other {
+    const char* kind;
+    const char* text;
+    std::vector<void (*)(Position*, Quaternion*)> changes;
+  };
+  const Other others[] = {
+      {"orientation_order", "reading the orientations' columns as qx qy qz qw, scalar last", {scalar_last}},
+      {"orientation_inverse", "taking the inverse of the orientations", {turned_round}},
+      {"orientation_inverse",
+       "reading the orientations' columns as qx qy qz qw, scalar last, and taking their inverse",
+       {scalar_last, turned_round}},
+      {"pose_inverse", "taking the inverse of the measured poses", {inverted}},
+      {"pose_inverse",
+       "reading the orientations' columns as qx qy qz qw, scalar last, and taking the inverse of the measured poses",
+       {scalar_last, inverted}},
+  };
+  std::vector<std::int32_t> rows(data.rows);
+  std::iota(rows.begin(), rows.end(), 0);
+  const ErrorStatistics as_is = errors(data);
+  double least = std::min(kWrong, kBetter * as_is.rotation_rms);
+  std::optional<BetterOrientations> out;
+  if (!(as_is.rotation_rms > kWrong)) return out;
+  for (const Other& other : others) {
+    Measurements read = with_poses(data, [&](Position* p, Quaternion* q) {
+      for (const auto change : other.changes) change(p, q);
+    });
+    const ErrorStatistics left = errors(read);
+    if (!(left.rotation_rms < least && left.median < kOfRange * measured_range(read, rows))) continue;
+    least = left.rotation_rms;
+    out = BetterOrientations{{robot, std::move(read), other.kind, other.text}, as_is.rotation_rms, left.rotation_rms};
+  }
+  return out;
+}
+
+std::string text_of(const BetterOrientations& better) {
+  return better.reading.text + " leaves a rotation error of " + degrees(better.left) + " in place of " +
+         degrees(better.as_is) + " with base and tool fitted. Correct it and run again";
 }
 
 std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Measurements& data) {

@@ -66,8 +66,9 @@ def review(
 
     A joint with the wrong sign is fitted as well by turning two links round. So where a link changed by more
     than a workshop makes (10 mm or 2 % of the reach, 3 degrees), or much is left over, the usual mistakes are
-    tried: the sign of a joint, the order of joint columns, units of angles and lengths, the convention of
-    the links. One that explains the data is named.
+    tried: the sign of a joint, the order of joint columns, units of angles and lengths, a left-handed frame,
+    the convention of the links; and where rotations are far off, other readings of the orientations. One that
+    explains the data is named.
 
     robot, data, options: those of `identify`. found: what it found.
 

@@ -756,6 +756,16 @@ TEST_CASE("diagnose recognises exchanged and turned joint columns") {
   CHECK(finding(e, "joint_sign")->text.find("joint column 2") != std::string::npos);
 }
 
+TEST_CASE("diagnose names nothing before orientations are read as they were measured") {
+  auto table = measured(perturbed(light_arm(), 3e-4, 3e-4, 916), 80, 917, What::pose);
+  CHECK_FALSE(finding(diagnose(light_arm(), table->data), "orientation_order"));
+  std::rotate(table->data.orientation.begin(), table->data.orientation.begin() + 1, table->data.orientation.end());
+  const Diagnosis d = diagnose(light_arm(), table->data);
+  REQUIRE(finding(d, "orientation_order"));
+  CHECK(finding(d, "orientation_order")->mistake);
+  CHECK(d.effects.empty());
+}
+
 TEST_CASE("diagnose says how many rows joints and measurements are apart") {
   for (const int shift : {-2, 1, 3}) {
     auto table = measured(light_arm(), 120, 915);

@@ -63,6 +63,70 @@ TEST_CASE("a joint column with the wrong sign is found on every arm") {
   }
 }
 
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+/// Every measured pose as `change` has it.
+void change_poses(Table* table, const std::function<void(Vector3d*, Quaterniond*)>& change) {
+  std::vector<std::vector<double>> columns(7, std::vector<double>(table->data.rows));
+  for (std::size_t row = 0; row < table->data.rows; ++row) {
+    Vector3d p(table->data.position[0][row], table->data.position[1][row], table->data.position[2][row]);
+    Quaterniond q(table->data.orientation[0][row], table->data.orientation[1][row], table->data.orientation[2][row],
+                  table->data.orientation[3][row]);
+    change(&p, &q);
+    const double values[] = {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()};
+    for (std::size_t k = 0; k < 7; ++k) columns[k][row] = values[k];
+  }
+  for (std::size_t k = 0; k < 3; ++k) table->data.position[k] = table->add(columns[k]);
+  for (std::size_t k = 0; k < 4; ++k) table->data.orientation[k] = table->add(columns[3 + k]);
+}
+
+}  // namespace
+
+TEST_CASE("orientations that are scalar last, turned round or of inverse poses are found on every arm") {
+  const auto scalar_last = [](Quaterniond q) { return Quaterniond(q.x(), q.y(), q.z(), q.w()); };
+  for (const Robot& robot : some_arms()) {
+    const auto said_of = [&](const std::string& kind, const std::string& words,
+                             const std::function<void(Vector3d*, Quaterniond*)>& change) {
+      const auto table = measured(robot, 100, 130, What::pose);
+      change_poses(table.get(), change);
+      check_said(robot, table->data, kind, words);
+    };
+    said_of("orientation_order", "qx qy qz qw, scalar last leaves", [&](auto*, auto* q) { *q = scalar_last(*q); });
+    said_of("orientation_inverse", "inverse of the orientations", [&](auto*, auto* q) { *q = q->conjugate(); });
+    said_of("orientation_inverse", "scalar last, and taking their inverse",
+            [&](auto*, auto* q) { *q = scalar_last(q->conjugate()); });
+    const auto invert = [](auto* p, auto* q) {
+      *q = q->conjugate();
+      *p = -(*q * *p);
+    };
+    said_of("pose_inverse", "taking the inverse of the measured poses", invert);
+    said_of("pose_inverse", "scalar last, and taking the inverse of the measured poses", [&](auto* p, auto* q) {
+      invert(p, q);
+      *q = scalar_last(*q);
+    });
+  }
+}
+
+TEST_CASE("a left-handed frame of the instrument is found on every arm") {
+  for (const Robot& robot : some_arms()) {
+    for (const What what : {What::position, What::pose}) {
+      const auto table = measured(robot, 150, 140, what);
+      if (what == What::position) {
+        scale(table.get(), &table->data.position[2], -1.0);
+      } else {
+        change_poses(table.get(), [](Vector3d* p, Quaterniond* q) {
+          p->z() = -p->z();
+          *q = Quaterniond(q->w(), -q->x(), -q->y(), q->z());
+        });
+      }
+      check_said(robot, table->data, "handedness", "left-handed frame");
+    }
+  }
+}
+
 TEST_CASE("exchanged joint columns are found on every arm") {
   for (const Robot& robot : some_arms()) {
     for (std::size_t k = 0; k + 1 < robot.driven_count(); k += kEvery) {
