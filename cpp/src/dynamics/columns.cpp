@@ -194,9 +194,7 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std
       by_joint_(columns_by_joint(design, columns_, tiles.robot().driven_count())) {
   for (const int c : columns_) {
     const TorqueTerm& term = design.terms[static_cast<std::size_t>(c)];
-    needs_rigid_ = needs_rigid_ || (term.link_parameter < 0 && term.needs_rigid);
     needs_torque_ = needs_torque_ || term.needs_torque;
-    needs_inertia_ = needs_inertia_ || term.needs_inertia;
   }
 }
 
@@ -208,8 +206,17 @@ const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<Mat
 }
 
 void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const {
-  if (needs_rigid_) fill_rigid(&tile->motion);
-  if (needs_inertia_) fill_inertia(&tile->motion);
+  const auto any = [&](bool TorqueTerm::* needs) {
+    return std::any_of(columns_.begin(), columns_.end(), [&](int c) {
+      const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
+      return term.link_parameter < 0 && term.*needs && wanted(term);
+    });
+  };
+  if (any(&TorqueTerm::needs_rigid)) fill_rigid(&tile->motion);
+  if (any(&TorqueTerm::needs_yielding))
+    fill_yielding(&tile->motion);
+  else if (any(&TorqueTerm::needs_inertia))
+    fill_inertia(&tile->motion);
   std::vector<MatrixXd> made;
   std::vector<Index> next(by_joint_.size(), 0);
   std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place
@@ -231,11 +238,13 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)
       if (k == 0 && !term.column.empty()) made_already.try_emplace(term.column, j, place);
       if (of_link)
         out = links_of(tile, &made)[j].col(place_of(chain_, j, term.link_parameter));
+      else if (values.rows() == 0)
+        out.setZero();
       else
         tile->own_rows(values.col(static_cast<Index>(k)).data(), out.data());
     }
   }
-  tile->motion.rigid.clear();  // large, and soon made again
+  clear_tables(&tile->motion);
 }
 
 void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use) const {
@@ -286,7 +295,7 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
   auto out = std::make_shared<std::vector<JointGrams>>();
   std::vector<SumOrder> orders;
   for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j) {
-    out->push_back({columns.of_joint(j), std::vector<Gram>(static_cast<std::size_t>(folds.count))});
+    out->emplace_back(columns.of_joint(j), columns.design().terms.size(), folds.count);
     orders.push_back(order_of(columns.design(), columns.of_joint(j), earlier));
   }
   std::vector<TileGrams> lot(Tiles::kTogether);
@@ -323,7 +332,7 @@ namespace {
 /// not kept, to make every one of them would take longer than to filter what they are together.
 class ErrorsOf {
  public:
-  ErrorsOf(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values)
+  ErrorsOf(const DesignColumns& columns, const TorqueModel& model, const TorqueModel& seen, const VectorXd& values)
       : columns_(columns), model_(model), values_(values) {
     if (columns.are_kept()) return;
     std::vector<ValuedTerm> terms;
@@ -332,8 +341,8 @@ class ErrorsOf {
       if (value != 0.0) terms.push_back({columns.design().terms[c], value});
     }
     fitted_ = std::make_unique<TorqueModel>(model.with(terms));
-    // What the robot carries already sees its own torque alone.
-    if (!model.robot().torque_effects.empty()) fitted_ = std::make_unique<TorqueModel>(fitted_->seeing(model));
+    if (columns.any_needs_torque() || !model.robot().torque_effects.empty())
+      fitted_ = std::make_unique<TorqueModel>(fitted_->seeing(seen));
   }
 
   MatrixXd operator()(Tile* tile) const {
@@ -363,16 +372,16 @@ class ErrorsOf {
 
 std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values,
                             const Folds& folds) {
-  const ErrorsOf errors_of(columns, model, values);
+  const ErrorsOf errors_of(columns, model, model, values);
   return noise_of(columns.tiles(), [&](Tile& tile) { return errors_of(&tile); }, folds);
 }
 
-std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const VectorXd& values,
-                           const Folds& folds) {
+std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
+                           const VectorXd& values, const Folds& folds) {
   const auto joints = static_cast<Index>(columns.tiles().robot().driven_count());
   VectorXd squares = VectorXd::Zero(joints), rows = squares;
   std::vector<std::pair<VectorXd, VectorXd>> lot(Tiles::kTogether);
-  const ErrorsOf errors_of(columns, subtracted, values);
+  const ErrorsOf errors_of(columns, subtracted, seen, values);
   const auto work = [&](Tile& tile, std::size_t k) {
     const MatrixXd errors = errors_of(&tile);
     const VectorXd time = tile.own_time();

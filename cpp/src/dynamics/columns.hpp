@@ -47,15 +47,15 @@ class DesignColumns {
   RigidChain chain_;
   std::vector<int> columns_;  ///< ascending
   std::vector<std::vector<int>> by_joint_;
-  bool needs_rigid_ = false, needs_torque_ = false, needs_inertia_ = false;
+  bool needs_torque_ = false;
   mutable std::vector<Tables> kept_;  ///< by tile, where they are kept; empty: not yet made
   mutable std::vector<char> stale_;   ///< by tile: turned() since
 };
 
 /// What a fit of all columns leaves of the torque that `subtracted` leaves, in rows that these folds have, those at
-/// rest included: rms by joint [Nm | N]. None of the columns that have a value may need a torque.
-std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const Eigen::VectorXd& values,
-                           const Folds& folds);
+/// rest included: rms by joint [Nm | N]. Columns that need a torque were last summed with that of `seen`.
+std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
+                           const Eigen::VectorXd& values, const Folds& folds);
 
 /// Sums of the same columns over the same folds, from before the torque that is seen became another, or friction
 /// turned otherwise (DesignColumns::turned): products of columns that ask for neither are as they were.

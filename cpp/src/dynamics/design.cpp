@@ -273,7 +273,7 @@ MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
   if (model.needs_rigid()) fill_rigid(&tile->motion);
   set_direction(model.turns(), tile);
   MatrixXd out = model.torque_by_direction(&tile->motion);
-  tile->motion.rigid.clear();  // large, and soon made again
+  clear_tables(&tile->motion);
   return out;
 }
 
@@ -418,13 +418,14 @@ double rows_counted(const Noise& noise, std::size_t fold) {
   return usual / noise.design_effect;
 }
 
-/// Where a number stands among ascending ones; -1: it is not among them.
-Index place_in(const std::vector<int>& ascending, int number) {
-  const auto found = std::lower_bound(ascending.begin(), ascending.end(), number);
-  return found != ascending.end() && *found == number ? static_cast<Index>(found - ascending.begin()) : -1;
-}
+Index place_of(const JointGrams& grams, int column) { return grams.places[static_cast<std::size_t>(column)]; }
 
 }  // namespace
+
+JointGrams::JointGrams(std::vector<int> of_joint, std::size_t of_design, int count)
+    : columns(std::move(of_joint)), places(of_design, -1), folds(static_cast<std::size_t>(count)) {
+  for (std::size_t k = 0; k < columns.size(); ++k) places[static_cast<std::size_t>(columns[k])] = static_cast<Index>(k);
+}
 
 FoldGram::FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>& noise)
     : grams_(std::move(grams)), fold_(fold) {
@@ -441,11 +442,10 @@ VectorXd FoldGram::products(const std::vector<int>& columns, int with) const {
   VectorXd out = VectorXd::Zero(static_cast<Index>(columns.size()));
   for (std::size_t j = 0; j < grams_->size(); ++j) {
     const Gram& gram = (*grams_)[j].folds[fold_];
-    const std::vector<int>& mine = (*grams_)[j].columns;
-    const Index at = place_in(mine, with);
+    const Index at = place_of((*grams_)[j], with);
     if (gram.xx.size() == 0 || at < 0) continue;
     for (Index k = 0; k < out.size(); ++k) {
-      const Index row = place_in(mine, columns[static_cast<std::size_t>(k)]);
+      const Index row = place_of((*grams_)[j], columns[static_cast<std::size_t>(k)]);
       if (row >= 0) out[k] += weights_[j] * gram.xx(row, at);
     }
   }
@@ -456,7 +456,7 @@ double FoldGram::product(int one, int other) const {
   double out = 0.0;
   for (std::size_t j = 0; j < grams_->size(); ++j) {
     const Gram& gram = (*grams_)[j].folds[fold_];
-    const Index row = place_in((*grams_)[j].columns, one), at = place_in((*grams_)[j].columns, other);
+    const Index row = place_of((*grams_)[j], one), at = place_of((*grams_)[j], other);
     if (gram.xx.size() > 0 && row >= 0 && at >= 0) out += weights_[j] * gram.xx(row, at);
   }
   return out;
@@ -466,7 +466,7 @@ double FoldGram::product(int column) const {
   double out = 0.0;
   for (std::size_t j = 0; j < grams_->size(); ++j) {
     const Gram& gram = (*grams_)[j].folds[fold_];
-    const Index at = place_in((*grams_)[j].columns, column);
+    const Index at = place_of((*grams_)[j], column);
     if (gram.xx.size() > 0 && at >= 0) out += weights_[j] * gram.xy[at];
   }
   return out;
@@ -479,10 +479,9 @@ Gram FoldGram::of(const std::vector<int>& columns) const {
   for (std::size_t j = 0; j < grams_->size(); ++j) {
     const Gram& gram = (*grams_)[j].folds[fold_];
     if (gram.xx.size() == 0) continue;
-    const std::vector<int>& mine = (*grams_)[j].columns;  // ascending
     at.clear();
     for (Index k = 0; k < p; ++k) {
-      const Index place = place_in(mine, columns[static_cast<std::size_t>(k)]);
+      const Index place = place_of((*grams_)[j], columns[static_cast<std::size_t>(k)]);
       if (place >= 0) at.emplace_back(k, place);
     }
     for (const auto& [a, from] : at) {

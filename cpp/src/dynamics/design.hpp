@@ -66,8 +66,12 @@ struct Folds {
 
 /// Normal equations of one joint's torque, fold by fold; columns are numbers of the design's.
 struct JointGrams {
+  /// `of_design`: how many columns the design has.
+  JointGrams(std::vector<int> columns, std::size_t of_design, int folds);
+
   std::vector<int> columns;
-  std::vector<Gram> folds;  ///< without rows: empty
+  std::vector<Eigen::Index> places;  ///< where each column of the design stands among these; -1: it does not
+  std::vector<Gram> folds;           ///< without rows: empty
 };
 using TorqueGrams = std::shared_ptr<const std::vector<JointGrams>>;  ///< by joint
 

@@ -120,7 +120,7 @@ class Refit {
     table_.turned();
     grams_ = sum_grams(table_, problem_.nominal, seen_.turning(problem_.range.turns), problem_.train, {grams_, true});
     const Fit fit = fit_of(sums_of(grams_, noise_, design_, inertial_columns(design_)), columns_);
-    return rms_of(problem_, problem_.nominal.with(valued(design_, fit)));
+    return rms_of(table_, problem_.nominal, seen_, by_column(design_, fit), problem_.train);
   }
 
  private:

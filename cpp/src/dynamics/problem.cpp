@@ -379,6 +379,12 @@ TorqueModel model_of(const Robot& robot, const Problem& problem) {
   return {robot, valued_terms(robot, problem.range, problem.own_effects)};
 }
 
+VectorXd by_column(const TorqueDesign& design, const Fit& fit) {
+  VectorXd out = VectorXd::Zero(static_cast<Index>(design.terms.size()));
+  out(fit.columns) = fit.values;
+  return out;
+}
+
 std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit) {
   std::vector<ValuedTerm> out;
   for (std::size_t k = 0; k < fit.columns.size(); ++k)
@@ -387,13 +393,6 @@ std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit) {
 }
 
 namespace {
-
-/// By column of the design: the fit's values, others nought.
-VectorXd by_column(const TorqueDesign& design, const Fit& fit) {
-  VectorXd out = VectorXd::Zero(static_cast<Index>(design.terms.size()));
-  out(fit.columns) = fit.values;
-  return out;
-}
 
 TorqueDesign standard_design(const Problem& problem) {
   TorqueDesign design;
@@ -531,8 +530,8 @@ struct Moments {
 
 using ModelMoments = std::vector<std::vector<Moments>>;  // by model and joint
 
-/// Of one tile, its rows in these folds. `inside`: without those that are not.
-ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds, bool inside,
+/// Of one tile, its rows in these folds.
+ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds,
                         Tile* tile) {
   ModelMoments out;
   const VectorXd time = tile->own_time();
@@ -542,7 +541,6 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
     for (Index i = 0; i < tile->count; ++i) {
       if (folds.fold(tile->recording, time[i]) < 0) continue;
       for (Index j = 0; j < predicted.cols(); ++j) {
-        if (inside && tile->inside(i, j) == 0.0) continue;
         const double y = tile->measured(i, j);
         if (!std::isnan(y)) by_joint[static_cast<std::size_t>(j)].add(y, predicted(i, j));
       }
@@ -554,8 +552,7 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
 
 /// By model and joint.
 std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Problem& problem,
-                                                const std::vector<std::pair<std::string, TorqueModel>>& models,
-                                                bool inside = false) {
+                                                const std::vector<std::pair<std::string, TorqueModel>>& models) {
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
   std::vector<ModelMoments> lot(Tiles::kTogether);
   ModelMoments all(models.size(), std::vector<Moments>(driven.size()));
@@ -564,7 +561,7 @@ std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Proble
       for (std::size_t j = 0; j < driven.size(); ++j) all[m][j].add(lot[k][m][j]);
   };
   problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
-                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, inside, &tile); }, add);
+                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
   std::vector<std::vector<TorqueError>> out(models.size());
   for (std::size_t m = 0; m < models.size(); ++m)
     for (std::size_t j = 0; j < driven.size(); ++j)
@@ -588,13 +585,6 @@ std::vector<TorqueErrors> errors_of(const Problem& problem,
 }
 
 // --- the turn of friction ------------------------------------------------------------------------
-
-std::vector<double> rms_of(const Problem& problem, const TorqueModel& model) {
-  const std::vector<std::vector<TorqueError>> errors = errors_on(problem.train, problem, {{"", model}}, true);
-  std::vector<double> out;
-  for (const TorqueError& error : errors.front()) out.push_back(error.rms);
-  return out;
-}
 
 void choose_turns(Problem* problem, const std::function<std::vector<double>()>& errors_with) {
   constexpr FrictionTurn kTurns[] = {{0.01, 0.0}, {1e-3, 0.0}, {3e-4, 0.0}, {0.01, 1e-6}, {0.01, 1e-5}, {0.01, 1e-4}};
@@ -633,7 +623,7 @@ Groundwork groundwork_of(Problem* problem) {
   };
   choose_turns(problem, [&] {
     const StandardFit now = fitted();
-    return rms_of(table, problem->nominal, by_column(design, now.fit), problem->train);
+    return rms_of(table, problem->nominal, problem->nominal, by_column(design, now.fit), problem->train);
   });
   StandardFit chosen = fitted();
   std::vector<Noise> noise = noise_of(table, problem->nominal, by_column(design, chosen.fit), problem->train);

@@ -72,6 +72,9 @@ Eigen::VectorXd values_of(const TorqueGrams& grams, const std::vector<Noise>& no
 Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& sums, const Fit& fit,
                 std::vector<std::string>* warnings);
 
+/// By column of the design: the fit's values, others nought.
+Eigen::VectorXd by_column(const TorqueDesign& design, const Fit& fit);
+
 /// Terms with the values of a fit.
 std::vector<ValuedTerm> valued(const TorqueDesign& design, const Fit& fit);
 
@@ -98,9 +101,6 @@ Groundwork groundwork_of(Problem* problem);
 /// turns more slowly than the joint does, or forgets at rest, would look like presliding and like Stribeck's curve.
 /// `errors_with`: rms errors by joint on these rows of what is fitted with the turns that are set [Nm | N].
 void choose_turns(Problem* problem, const std::function<std::vector<double>()>& errors_with);
-/// Of a model, by joint, on the training rows, those at rest included.
-std::vector<double> rms_of(const Problem& problem, const TorqueModel& model);
-
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
               const MotionRange& range);

@@ -171,7 +171,7 @@ void RigidChain::passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, con
   thread_local std::vector<double> motions, scratch;
   const auto plane = static_cast<std::size_t>(links() * kPassRows);
   motions.resize(3 * plane);
-  scratch.resize(kernel::rigid_scratch(static_cast<int>(driven())));
+  scratch.resize(kernel::rigid_scratch(static_cast<int>(links()), static_cast<int>(driven())));
   const kernel::RigidProgram program{compiled_.data(),
                                      static_cast<int>(links()),
                                      static_cast<int>(driven()),
@@ -251,6 +251,38 @@ std::vector<Eigen::MatrixXd> RigidChain::mass_matrices(const Eigen::MatrixXd& q,
            for (Eigen::Index k = 0; k < driven(); ++k)
              out[static_cast<std::size_t>(k)].middleRows(first, rows) =
                  all.middleCols(k * driven(), driven()).topRows(rows);
+         });
+  return out;
+}
+
+RigidChain::Changes RigidChain::torque_changes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
+                                               const Eigen::MatrixXd& qdd, const Eigen::VectorXd& parameters,
+                                               const Eigen::MatrixXd& dq, const Eigen::MatrixXd& dqd,
+                                               const Eigen::MatrixXd& dqdd) const {
+  const std::vector<Eigen::MatrixXd> room(static_cast<std::size_t>(driven()), Eigen::MatrixXd(q.rows(), driven()));
+  Changes out{room, room};
+  thread_local std::vector<double> part, change;
+  passes(q, qd, qdd, 0, q.rows(),
+         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
+           change.assign(static_cast<std::size_t>(3 * driven() * tile.stride), 0.0);
+           double* to = change.data();
+           for (const Eigen::MatrixXd* const table : {&dq, &dqd, &dqdd}) {
+             for (Eigen::Index k = 0; k < driven(); ++k, to += tile.stride)
+               std::copy_n(table->col(k).data() + first, rows, to);
+           }
+           const Eigen::Index columns = driven() * driven();
+           part.resize(static_cast<std::size_t>(2 * columns * tile.samples));
+           double* const blocks[] = {part.data(), part.data() + columns * tile.samples};
+           tile.blocks = blocks;
+           tile.column_stride = tile.samples;
+           kernel::rigid_functions().torque_change(program, tile, parameters.data(), change.data());
+           const Eigen::Map<const Eigen::MatrixXd> torques(blocks[0], tile.samples, columns),
+               masses(blocks[1], tile.samples, columns);
+           for (Eigen::Index k = 0; k < driven(); ++k) {
+             const auto at = static_cast<std::size_t>(k);
+             out.torques[at].middleRows(first, rows) = torques.middleCols(k * driven(), driven()).topRows(rows);
+             out.masses[at].middleRows(first, rows) = masses.middleCols(k * driven(), driven()).topRows(rows);
+           }
          });
   return out;
 }

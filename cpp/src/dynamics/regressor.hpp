@@ -48,6 +48,15 @@ class RigidChain {
                           const Eigen::VectorXd& parameters) const;
   /// The mass matrix of links with these parameters in every row: column k of it, shape=(rows, driven), at place k.
   std::vector<Eigen::MatrixXd> mass_matrices(const Eigen::MatrixXd& q, const Eigen::VectorXd& parameters) const;
+  /// What these torques change by, to first order, where a reading's motion is another by `dq` and its derivatives,
+  /// shape=(rows, driven) each: for a change of reading k's motion alone those of all readings, shape=(rows, driven),
+  /// at place k. Found on the way: mass_matrices().
+  struct Changes {
+    std::vector<Eigen::MatrixXd> torques, masses;
+  };
+  Changes torque_changes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
+                         const Eigen::VectorXd& parameters, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& dqd,
+                         const Eigen::MatrixXd& dqdd) const;
   static constexpr Eigen::Index padded(Eigen::Index rows) {
     return (rows + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple * kernel::kSampleMultiple;
   }

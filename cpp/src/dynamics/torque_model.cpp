@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/filter.hpp"
 #include "dynamics/payload.hpp"
 #include "dynamics/turn.hpp"
 
@@ -31,16 +32,26 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
   for (const ValuedTerm& valued : terms) {
     if (valued.term.needs_torque != that_need_torque || valued.value == 0.0) continue;
     const MatrixXd columns = valued.term.basis(motion);
+    if (columns.rows() == 0) continue;
     for (std::size_t k = 0; k < valued.term.joints.size(); ++k)
       torque->col(static_cast<Index>(valued.term.joints[k])) += valued.value * columns.col(static_cast<Index>(k));
   }
 }
 
-void fill_inertia(Motion* motion) {
-  const Eigen::VectorXd bodies = motion->bodies.size() > 0 ? motion->bodies : link_parameters(*motion->robot);
-  if (!motion->inertia.empty() && motion->inertia_of == bodies) return;
-  motion->inertia = mass_matrix_columns(*motion->robot, motion->q, bodies);
-  motion->inertia_of = bodies;
+void fill_inertia(Motion* motion) { motion->inertia = mass_matrix_columns(*motion->robot, motion->q, motion->bodies); }
+
+void fill_yielding(Motion* motion) {
+  const MatrixXd dq = -motion->torque, dqd = rate_of(dq, motion->step), dqdd = rate_of(dqd, motion->step);
+  RigidChain::Changes changes =
+      RigidChain(*motion->robot).torque_changes(motion->q, motion->qd, motion->qdd, motion->bodies, dq, dqd, dqdd);
+  motion->yielding = std::move(changes.torques);
+  motion->inertia = std::move(changes.masses);
+}
+
+void clear_tables(Motion* motion) {
+  motion->rigid.clear();
+  motion->inertia.clear();
+  motion->yielding.clear();
 }
 
 namespace {
@@ -85,10 +96,11 @@ TorqueModel TorqueModel::turning(const std::vector<FrictionTurn>& turns) const {
   return out;
 }
 
-bool TorqueModel::needs_rigid() const {
-  return std::any_of(terms_.begin(), terms_.end(), [](const ValuedTerm& v) { return v.term.needs_rigid; }) ||
-         (seen_ && seen_->needs_rigid());
+bool TorqueModel::any(bool TorqueTerm::* needs) const {
+  return std::any_of(terms_.begin(), terms_.end(), [needs](const ValuedTerm& v) { return v.term.*needs; });
 }
+
+bool TorqueModel::needs_rigid() const { return any(&TorqueTerm::needs_rigid) || (seen_ && seen_->needs_rigid()); }
 
 TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
   TorqueModel out = *this;
@@ -98,10 +110,12 @@ TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
 }
 
 MatrixXd TorqueModel::torque_of_others(Motion* motion) const {
-  MatrixXd out = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
-  add_payload(*motion, &out);
-  motion->carried = out;
-  out += motion->qdd * rotors_;  // it is symmetric
+  if (motion->bodies.size() != links_.size() || motion->bodies != links_) {  // else it is known what is carried
+    motion->carried = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
+    add_payload(*motion, &motion->carried);
+    motion->bodies = links_;
+  }
+  MatrixXd out = motion->carried + motion->qdd * rotors_;  // it is symmetric
   add_terms(terms_, false, *motion, &out);
   return out;
 }
@@ -112,18 +126,17 @@ MatrixXd TorqueModel::torque(Motion* motion) const {
 }
 
 MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
-  MatrixXd seen, carried;
+  MatrixXd out = torque_of_others(motion);
   if (seen_) {
     const MatrixXd mine = std::exchange(motion->direction, directions_of(*motion, seen_->turns_));
-    seen = seen_->torque_of_others(motion);
-    carried = motion->carried;
+    motion->torque = seen_->torque_of_others(motion);
     motion->direction = mine;
+  } else {
+    motion->torque = out;
   }
-  MatrixXd out = torque_of_others(motion);
-  motion->torque = seen_ ? seen : out;
-  motion->bodies = seen_ ? seen_->links_ : links_;
-  if (seen_) motion->carried = carried;
-  if (std::any_of(terms_.begin(), terms_.end(), [](const ValuedTerm& v) { return v.term.needs_inertia; }))
+  if (any(&TorqueTerm::needs_yielding))
+    fill_yielding(motion);
+  else if (any(&TorqueTerm::needs_inertia))
     fill_inertia(motion);
   add_terms(terms_, true, *motion, &out);
   return out;

@@ -28,8 +28,11 @@ std::vector<ValuedTerm> valued_terms(const Robot& robot, const MotionRange& rang
 void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, const Motion& motion,
                Eigen::MatrixXd* torque);
 
-/// Makes Motion::inertia where it is not there yet, or is that of other bodies.
+/// Make Motion::inertia, of Motion::bodies, and Motion::yielding, with which Motion::inertia is found.
 void fill_inertia(Motion* motion);
+void fill_yielding(Motion* motion);
+/// And Motion::rigid: they are large, and soon made again.
+void clear_tables(Motion* motion);
 
 /// A robot's torques with the payload that the recording states, and a correction beside them.
 class TorqueModel {
@@ -64,6 +67,7 @@ class TorqueModel {
   /// Of all but the terms that ask for the torque, by Motion::direction.
   Eigen::MatrixXd torque_of_others(Motion* motion) const;
   void add(std::vector<ValuedTerm> more);
+  bool any(bool TorqueTerm::* needs) const;
 
   Robot robot_;
   RigidChain chain_;

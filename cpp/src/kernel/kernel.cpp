@@ -339,9 +339,28 @@ std::size_t gram_size(int columns) {
   return size;
 }
 
+bool is_zero(const double* x, int length) {
+  for (int k = 0; k < length; k += kLanes) {
+    const Mask here = load(x + k) != 0.0;
+    for (int l = 0; l < kLanes; ++l)
+      if (here[l] != 0) return false;
+  }
+  return true;
+}
+
 void gram_add(const double* c, std::ptrdiff_t stride, int columns, int known, int length, double* acc) {
+  // Many columns act now and then only, and what is nought adds nothing.
+  constexpr int kMostLooked = 4096;
+  bool zero[kMostLooked] = {};
+  for (int k = 0; k < columns && k < kMostLooked; ++k) zero[k] = is_zero(c + stride * k, length);
+  const auto all_zero = [&](int first, int count) {
+    for (int k = first; k < first + count && k < columns; ++k)
+      if (k >= kMostLooked || !zero[k]) return false;
+    return true;
+  };
   for_blocks(columns, [&](int i, int j, std::size_t at) {
     if (j + kCols <= known) return;  // above the diagonal all of it is known
+    if (all_zero(i, kRows) || all_zero(j, kCols)) return;
     const double* a[kRows];
     const double* b[kCols];
     // Beyond the last column the last one is read again; gram_reduce leaves those products out.
@@ -403,15 +422,36 @@ inline void filter_rows(const double* phases, std::ptrdiff_t length, int step, c
   for (int m = 0; m < packs; ++m) store(out + m * kLanes, sum[m]);
 }
 
+#if TRUING_LANES == 8 && (defined(__clang__) || __GNUC__ >= 12)
+#define TRUING_PARTS_BY_FOUR
+// 32 numbers, every fourth one together: out[phase * length + i] = x[4 i + phase].
+inline void part_by_four(const double* x, std::ptrdiff_t length, double* out) {
+  const Pack a = load(x), b = load(x + 8), c = load(x + 16), d = load(x + 24);
+  const Pack ab_low = __builtin_shufflevector(a, b, 0, 4, 8, 12, 1, 5, 9, 13);
+  const Pack cd_low = __builtin_shufflevector(c, d, 0, 4, 8, 12, 1, 5, 9, 13);
+  const Pack ab_high = __builtin_shufflevector(a, b, 2, 6, 10, 14, 3, 7, 11, 15);
+  const Pack cd_high = __builtin_shufflevector(c, d, 2, 6, 10, 14, 3, 7, 11, 15);
+  store(out, __builtin_shufflevector(ab_low, cd_low, 0, 1, 2, 3, 8, 9, 10, 11));
+  store(out + length, __builtin_shufflevector(ab_low, cd_low, 4, 5, 6, 7, 12, 13, 14, 15));
+  store(out + 2 * length, __builtin_shufflevector(ab_high, cd_high, 0, 1, 2, 3, 8, 9, 10, 11));
+  store(out + 3 * length, __builtin_shufflevector(ab_high, cd_high, 4, 5, 6, 7, 12, 13, 14, 15));
+}
+#endif
+
 void filter(const double* x, int step, const double* weights, int weight_count, int count, double* scratch,
             double* out) {
   const std::ptrdiff_t length = count + weight_count / step + 1,
                        last = (count - 1) * std::ptrdiff_t{step} + weight_count;
+  std::ptrdiff_t parted = 0;
+#ifdef TRUING_PARTS_BY_FOUR
+  for (; step == 4 && 4 * (parted + kLanes) <= last; parted += kLanes)  // what most recordings need
+    part_by_four(x + 4 * parted, length, scratch + parted);
+#endif
   for (std::ptrdiff_t phase = 0; phase < step; ++phase) {
     double* const to = scratch + phase * length;
-    const double* from = x + phase;
+    const double* from = x + phase + parted * step;
     const std::ptrdiff_t there = (last - phase + step - 1) / step;  // at most `length`
-    for (std::ptrdiff_t i = 0; i < there; ++i, from += step) to[i] = *from;
+    for (std::ptrdiff_t i = parted; i < there; ++i, from += step) to[i] = *from;
     for (std::ptrdiff_t i = there; i < length; ++i) to[i] = 0.0;
   }
   int first = 0;

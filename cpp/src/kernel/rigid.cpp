@@ -100,6 +100,7 @@ inline Vec times_inertia(const double* p, Vec v) {
 inline void add_twists(const RigidProgram& program, const RigidTile& tile, int i, const Moving& at) {
   const bool revolute = program.links[i].revolute;
   const Vec shift = revolute ? cross(at.o, at.z) : at.z;
+  for (int k = 0; i == 0 && k < 2 * program.driven_count; ++k) store_lanes(tile.scratch + 3 * kLanes * k, Vec{});
   for (int k = 0; k < program.driven_count; ++k) {
     const double by = program.coupling[i * program.driven_count + k];
     if (by == 0.0) continue;
@@ -136,21 +137,20 @@ inline void add_torques(const RigidProgram& program, const RigidTile& tile, int 
   }
 }
 
-/// Calls out(i, first, at) for every link behind its joint, a few samples at a time.
-template <typename Out>
-inline void sweep(const RigidProgram& program, const RigidTile& tile, Out out) {
+/// Calls joint(i, first, at) at every joint and out(i, first, at) for the link behind it, a few samples at a time.
+template <typename Joint, typename Out>
+inline void sweep(const RigidProgram& program, const RigidTile& tile, Joint joint, Out out) {
   const Pack zero{}, one = splat(1.0);
   const Vec nothing{zero, zero, zero};
   for (int first = 0; first < tile.samples; first += kLanes) {
     Moving at{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}, nothing, nothing, nothing, nothing};
     at.a = nothing - splat_vec(program.gravity);
-    for (int k = 0; k < 2 * program.driven_count; ++k) store_lanes(tile.scratch + 3 * kLanes * k, nothing);
     for (int i = 0; i < program.link_count; ++i) {
       const RigidLink& link = program.links[i];
       const std::ptrdiff_t row = i * tile.stride + first;
       const Pack motion = load(tile.motion + row), rate = load(tile.rate + row), acc = load(tile.acceleration + row);
       if (link.moves_before) at.pass(link.before);
-      add_twists(program, tile, i, at);
+      joint(i, first, at);
       if (link.revolute)
         at.turn(motion, rate, acc);
       else
@@ -159,6 +159,12 @@ inline void sweep(const RigidProgram& program, const RigidTile& tile, Out out) {
       out(i, first, at);
     }
   }
+}
+
+/// The same with the twists of the readings.
+template <typename Out>
+inline void sweep(const RigidProgram& program, const RigidTile& tile, Out out) {
+  sweep(program, tile, [&](int i, int, const Moving& at) { add_twists(program, tile, i, at); }, out);
 }
 
 void regressor(const RigidProgram& program, const RigidTile& tile) {
@@ -206,6 +212,198 @@ void mass_matrix(const RigidProgram& program, const RigidTile& tile, const doubl
   });
 }
 
+// --- what the torques change by (Carpentier and Mansard, Analytical derivatives of rigid body dynamics algorithms,
+// 2018); spatial vectors (Featherstone 2008) at the base's origin, in its axes
+
+struct Twist {
+  Vec n, v;  ///< turning, and the velocity at the origin
+};
+struct Wrench {
+  Vec n, f;  ///< moment about the origin, and force
+};
+inline Twist operator+(Twist a, Twist b) { return {a.n + b.n, a.v + b.v}; }
+inline Twist operator*(Pack s, Twist a) { return {s * a.n, s * a.v}; }
+inline Wrench operator+(Wrench a, Wrench b) { return {a.n + b.n, a.f + b.f}; }
+inline Wrench operator*(Pack s, Wrench a) { return {s * a.n, s * a.f}; }
+inline Twist cross(Twist a, Twist b) { return {cross(a.n, b.n), cross(a.n, b.v) + cross(a.v, b.n)}; }
+inline Wrench cross(Twist a, Wrench b) { return {cross(a.n, b.n) + cross(a.v, b.f), cross(a.n, b.f)}; }
+inline Pack dot(Twist a, Wrench b) { return dot(a.n, b.n) + dot(a.v, b.f); }
+
+/// A matrix by its columns.
+struct Columns {
+  Vec x, y, z;
+
+  Vec times(Vec v) const { return v.x * x + v.y * y + v.z * z; }
+  Vec transposed_times(Vec v) const { return {dot(x, v), dot(y, v), dot(z, v)}; }
+};
+inline Columns operator+(const Columns& a, const Columns& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+
+/// A link, or several as one, and the wrench that moves them as they move.
+struct Bodies {
+  Pack mass;
+  Vec first;        ///< first moment
+  Columns inertia;  ///< about the origin
+  Vec momentum;
+  Columns gyration;  ///< sum of 2 [w]x I - tr(I) [w]x - 2 [first]x [v]x
+  Wrench load;
+
+  Wrench times(Twist a) const { return {inertia.times(a.n) + cross(first, a.v), mass * a.v + cross(a.n, first)}; }
+  /// What the load changes by when all of them move faster by `more`, less what an acceleration of more x v takes:
+  /// I (more x v) + more x* (I v) + v x* (I more). Nothing comes of more.v.
+  Wrench carried_along(Twist more) const { return {gyration.times(more.n), cross(more.n + more.n, momentum)}; }
+};
+
+inline Bodies operator+(const Bodies& a, const Bodies& b) {
+  return {a.mass + b.mass,         a.first + b.first,       a.inertia + b.inertia,
+          a.momentum + b.momentum, a.gyration + b.gyration, a.load + b.load};
+}
+
+/// A link with ten parameters p that moves with v and accelerates with a.
+inline Bodies body(const Moving& at, Twist v, Twist a, const double* p) {
+  const Pack zero{}, one = splat(1.0);
+  const Vec ex{one, zero, zero}, ey{zero, one, zero}, ez{zero, zero, one};
+  Bodies out;
+  out.mass = splat(p[0]);
+  const Vec m = at.turned(splat_vec(p + 1));
+  out.first = m + out.mass * at.o;
+  // R I R^T, and on to the origin: + (o . m + o . first) 1 - first o^T - o m^T (Steiner).
+  const Vec Rx = at.turned({splat(p[4]), splat(p[7]), splat(p[8])}),
+            Ry = at.turned({splat(p[7]), splat(p[5]), splat(p[9])}),
+            Rz = at.turned({splat(p[8]), splat(p[9]), splat(p[6])});
+  const Pack size = dot(at.o, m + out.first);
+  out.inertia.x = at.x.x * Rx + at.y.x * Ry + at.z.x * Rz + size * ex - at.o.x * out.first - m.x * at.o;
+  out.inertia.y = at.x.y * Rx + at.y.y * Ry + at.z.y * Rz + size * ey - at.o.y * out.first - m.y * at.o;
+  out.inertia.z = at.x.z * Rx + at.y.z * Ry + at.z.z * Rz + size * ez - at.o.z * out.first - m.z * at.o;
+  const Wrench momentum = out.times(v);
+  out.momentum = momentum.f;
+  out.load = out.times(a) + cross(v, momentum);
+  const Pack trace = out.inertia.x.x + out.inertia.y.y + out.inertia.z.z;
+  const auto gyration = [&](Vec column, Vec unit) {
+    return cross(v.n, column + column - trace * unit) - cross(out.first + out.first, cross(v.v, unit));
+  };
+  out.gyration = {gyration(out.inertia.x, ex), gyration(out.inertia.y, ey), gyration(out.inertia.z, ez)};
+  return out;
+}
+
+/// A joint: its axis, and how the link before it moves.
+struct JointMotion {
+  Twist axis, v, a;
+};
+/// What acceleration and velocity along a joint's axis take of all behind it.
+struct JointLoad {
+  Wrench inertia;
+  Vec gyration;
+};
+
+template <class T>
+inline T kept(const double* place) {
+  T out;
+  std::memcpy(&out, place, sizeof out);
+  return out;
+}
+template <class T>
+inline void keep(double* place, const T& what) {
+  std::memcpy(place, &what, sizeof what);
+}
+
+constexpr int kNumbersOfLink = 58 * kLanes;
+static_assert(sizeof(JointMotion) + sizeof(JointLoad) + sizeof(Bodies) == kNumbersOfLink * sizeof(double),
+              "as rigid_scratch() has it");
+inline double* motion_place(const RigidTile& tile, int i) { return tile.scratch + kNumbersOfLink * i; }
+inline double* load_place(const RigidTile& tile, int i) {
+  return motion_place(tile, i) + sizeof(JointMotion) / sizeof(double);
+}
+inline double* bodies_place(const RigidTile& tile, int i) {
+  return load_place(tile, i) + sizeof(JointLoad) / sizeof(double);
+}
+inline Twist axis_of(const RigidTile& tile, int i) { return kept<Twist>(motion_place(tile, i)); }
+
+/// Of every link that of all behind it as well; of every joint what it takes of them.
+inline void add_up_bodies(const RigidProgram& program, const RigidTile& tile) {
+  for (int i = program.link_count - 1; i >= 0; --i) {
+    Bodies all = kept<Bodies>(bodies_place(tile, i));
+    if (i + 1 < program.link_count) all = all + kept<Bodies>(bodies_place(tile, i + 1));
+    keep(bodies_place(tile, i), all);
+    const Twist axis = axis_of(tile, i);
+    keep(load_place(tile, i), JointLoad{all.times(axis), all.gyration.transposed_times(axis.n) +
+                                                             cross(all.momentum + all.momentum, axis.v)});
+  }
+}
+
+/// Adds what joint m by `by` adds to a reading's columns: what the torques change by when it moves otherwise, and what
+/// they are for an acceleration of one. Seen from the links behind it their velocity changes by `more`, their
+/// acceleration by `pull` and more x v, and the wrench on them turns with them.
+inline void add_change(const RigidProgram& program, const RigidTile& tile, int m, double by, const Pack* change,
+                       double* changes, double* masses) {
+  const JointMotion at = kept<JointMotion>(motion_place(tile, m));
+  const Bodies all = kept<Bodies>(bodies_place(tile, m));
+  const Twist swept = cross(at.v, at.axis);
+  const Pack angle = splat(by) * change[0], rate = splat(by) * change[1], acceleration = splat(by) * change[2];
+  const Twist more = angle * swept + rate * at.axis;
+  const Twist pull =
+      angle * (cross(at.a, at.axis) + cross(at.v, swept)) + (rate + rate) * swept + acceleration * at.axis;
+  const Wrench wrench = all.times(pull) + all.carried_along(more) + angle * cross(at.axis, all.load);
+  const Wrench inertia = splat(by) * all.times(at.axis);
+  for (int l = 0; l < program.link_count; ++l) {
+    Pack felt, mass;
+    if (l <= m) {
+      const Twist axis = axis_of(tile, l);
+      felt = dot(axis, wrench);
+      mass = dot(axis, inertia);
+    } else {
+      const JointLoad load_of_joint = kept<JointLoad>(load_place(tile, l));
+      felt = dot(pull, load_of_joint.inertia) + dot(more.n, load_of_joint.gyration);
+      mass = splat(by) * dot(at.axis, load_of_joint.inertia);
+    }
+    for (int k = 0; k < program.driven_count; ++k) {
+      const double follows = program.coupling[l * program.driven_count + k];
+      if (follows == 0.0) continue;
+      const std::ptrdiff_t column = k * tile.column_stride;
+      store(changes + column, load(changes + column) + splat(follows) * felt);
+      store(masses + column, load(masses + column) + splat(follows) * mass);
+    }
+  }
+}
+
+void torque_change(const RigidProgram& program, const RigidTile& tile, const double* parameters, const double* change) {
+  const int driven = program.driven_count;
+  const auto add_changes = [&](int first) {
+    add_up_bodies(program, tile);
+    for (int k = 0; k < driven; ++k) {
+      const std::ptrdiff_t column = k * driven * tile.column_stride + first;
+      double* const changes = tile.blocks[0] + column;
+      double* const masses = tile.blocks[1] + column;
+      for (int l = 0; l < driven; ++l) {
+        store(changes + l * tile.column_stride, Pack{});
+        store(masses + l * tile.column_stride, Pack{});
+      }
+      Pack of_reading[3];
+      for (int d = 0; d < 3; ++d) of_reading[d] = load(change + (d * driven + k) * tile.stride + first);
+      for (int m = 0; m < program.link_count; ++m) {
+        const double by = program.coupling[m * driven + k];
+        if (by != 0.0) add_change(program, tile, m, by, of_reading, changes, masses);
+      }
+    }
+  };
+  Twist v, a;
+  const auto joint = [&](int i, int first, const Moving& at) {
+    const Vec nothing{};
+    if (i == 0) {
+      v = {nothing, nothing};
+      a = {nothing, nothing - splat_vec(program.gravity)};
+    }
+    const Twist axis = program.links[i].revolute ? Twist{at.z, cross(at.o, at.z)} : Twist{nothing, at.z};
+    keep(motion_place(tile, i), JointMotion{axis, v, a});
+    const std::ptrdiff_t row = i * tile.stride + first;
+    a = a + load(tile.acceleration + row) * axis + load(tile.rate + row) * cross(v, axis);
+    v = v + load(tile.rate + row) * axis;
+  };
+  sweep(program, tile, joint, [&](int i, int first, const Moving& at) {
+    keep(bodies_place(tile, i), body(at, v, a, parameters + kLinkColumns * i));
+    if (i + 1 == program.link_count) add_changes(first);
+  });
+}
+
 void sine_cosine_of(const double* angle, int count, double* sine, double* cosine) {
   for (int first = 0; first < count; first += kLanes) {
     Pack s, c;
@@ -220,6 +418,7 @@ void sine_cosine_of(const double* angle, int count, double* sine, double* cosine
 #define TRUING_TEXT_OF(x) #x
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const RigidFunctions rigid_table;
-const RigidFunctions rigid_table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque, mass_matrix, sine_cosine_of};
+const RigidFunctions rigid_table{
+    TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque, mass_matrix, torque_change, sine_cosine_of};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

@@ -37,10 +37,12 @@ struct RigidTile {
   std::ptrdiff_t stride;         ///< of these three
   double* const* blocks;         ///< out [driven][link]: first of ten columns; null: this joint does not feel this link
   std::ptrdiff_t column_stride;  ///< of these; of torques: of `blocks[0]`, one column for each driven joint
-  double* scratch;               ///< rigid_scratch(program.driven_count) numbers
+  double* scratch;               ///< rigid_scratch(program.link_count, program.driven_count) numbers
 };
 
-constexpr std::size_t rigid_scratch(int driven) { return 12 * kSampleMultiple * static_cast<std::size_t>(driven); }
+constexpr std::size_t rigid_scratch(int links, int driven) {
+  return kSampleMultiple * (12 * static_cast<std::size_t>(driven) + 58 * static_cast<std::size_t>(links));
+}
 
 struct RigidFunctions {
   const char* name;
@@ -49,6 +51,10 @@ struct RigidFunctions {
   void (*torque)(const RigidProgram&, const RigidTile&, const double* parameters);
   /// The mass matrix of links with these parameters: at blocks[0] driven * driven columns, row by row of the matrix.
   void (*mass_matrix)(const RigidProgram&, const RigidTile&, const double* parameters);
+  /// What these torques change by, to first order, where a reading's motion is another. `change`: [3][driven][stride],
+  /// of each reading's angle, rate and acceleration; at blocks[0] driven * driven columns: for a change of the first
+  /// reading's motion alone the torques of all, then for one of the second's. At blocks[1] the mass matrix, as above.
+  void (*torque_change)(const RigidProgram&, const RigidTile&, const double* parameters, const double* change);
   /// Of `count` angles below 1e5 rad, a multiple of kSampleMultiple; one of the outputs may be the input.
   void (*sine_cosine)(const double* angle, int count, double* sine, double* cosine);
 };

@@ -253,6 +253,36 @@ TEST_CASE("a column of the mass matrix is what an acceleration of one takes at r
   }
 }
 
+TEST_CASE("torques change with a reading's motion as their differences do, on every kind of robot") {
+  std::mt19937_64 random(29);
+  const Index rows = 75;
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    const RigidChain chain(robot);
+    const States states(chain, rows, &random), change(chain, rows, &random);
+    const VectorXd parameters = random_vector(kLinkParameters * chain.links(), 1.0, &random);
+    const RigidChain::Changes found =
+        chain.torque_changes(states.q, states.qd, states.qdd, parameters, change.q, change.qd, change.qdd);
+    const std::vector<MatrixXd> masses = chain.mass_matrices(states.q, parameters);
+    REQUIRE(found.torques.size() == static_cast<std::size_t>(chain.driven()));
+    for (Index k = 0; k < chain.driven(); ++k) {
+      const auto torques = [&](double part) {
+        States moved = states;
+        moved.q.col(k) += part * change.q.col(k);
+        moved.qd.col(k) += part * change.qd.col(k);
+        moved.qdd.col(k) += part * change.qdd.col(k);
+        return chain.torques(moved.q, moved.qd, moved.qdd, parameters);
+      };
+      const double h = 1e-3;  // Richardson: the error is of fourth order
+      const MatrixXd expected =
+          (8.0 * (torques(h) - torques(-h)) - (torques(2.0 * h) - torques(-2.0 * h))) / (12.0 * h);
+      const auto at = static_cast<std::size_t>(k);
+      CHECK((found.torques[at] - expected).cwiseAbs().maxCoeff() < 1e-8 * expected.cwiseAbs().maxCoeff());
+      CHECK((found.masses[at] - masses[at]).cwiseAbs().maxCoeff() < 1e-12 * masses[at].cwiseAbs().maxCoeff());
+    }
+  }
+}
+
 TEST_CASE("beyond the angles that the kernel takes the plain regressor stands in for it") {
   const Robot robot = arms::ur10();
   const MatrixXd near = MatrixXd::Constant(1, 6, 0.3), rate = MatrixXd::Constant(1, 6, 0.7);

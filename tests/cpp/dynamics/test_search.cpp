@@ -44,7 +44,7 @@ struct Rows {
   TorqueGrams grams() const {
     auto out = std::make_shared<std::vector<JointGrams>>();
     for (std::size_t j = 0; j < 2; ++j) {
-      out->push_back({columns[j], {}});
+      out->emplace_back(columns[j], kColumns, 0);
       for (std::size_t f = 0; f < kFolds; ++f) {
         const Eigen::MatrixXd mine = x[j][f](Eigen::all, columns[j]);
         out->back().folds.push_back({mine.transpose() * mine, mine.transpose() * y[j][f], y[j][f].squaredNorm(), 30.0});
@@ -108,7 +108,7 @@ struct TwoForms {
     std::mt19937_64 random(11);
     std::normal_distribution<double> normal(0.0, 1.0);
     auto grams = std::make_shared<std::vector<JointGrams>>();
-    grams->push_back({{0, 1}, {}});
+    grams->emplace_back(std::vector<int>{0, 1}, 2, 0);
     for (int f = 0; f < 4; ++f) {
       Eigen::MatrixXd x(40, 2);
       Eigen::VectorXd y(40);

@@ -38,7 +38,9 @@ struct Motion {
   /// Of every joint, shape=(rows, joints) each: torques for an acceleration of one of this joint alone, its column of
   /// the mass matrix of `bodies`. Empty where no term needs it.
   std::vector<Eigen::MatrixXd> inertia;
-  Eigen::VectorXd inertia_of;  ///< the bodies that it is of
+  /// Of every joint, shape=(rows, joints) each: what the torques change by when the link of this joint alone stands
+  /// `torque` times 1 rad/Nm (m/N) behind its motor, to first order. Empty where no term needs it.
+  std::vector<Eigen::MatrixXd> yielding;
   /// shape=(rows,) each: the further columns of the recording.
   std::map<std::string, Eigen::VectorXd> columns;
 
@@ -50,8 +52,8 @@ struct TorqueTerm {
   std::string parameter;            ///< full name, e.g. "coulomb.J2"
   std::string unit;                 ///< of the parameter
   std::vector<std::size_t> joints;  ///< whose torque it adds to: numbers among those that have a reading
-  /// shape=(rows, joints.size()) [Nm | N] for a parameter of one. Rows depend on each other only through what came
-  /// shortly before (a play operator); `Motion` begins early enough for that.
+  /// shape=(rows, joints.size()) [Nm | N] for a parameter of one; without rows: nought. Rows depend on each other only
+  /// through what came shortly before (a play operator); `Motion` begins early enough for that.
   std::function<Eigen::MatrixXd(const Motion&)> basis;
   bool needs_torque = false;  ///< the basis depends on Motion::torque
   /// The recordings show too little of it to name it, but it may stand for what they show.
@@ -59,6 +61,7 @@ struct TorqueTerm {
   bool needs_rigid = true;      ///< the basis may look at Motion::rigid
   bool needs_direction = true;  ///< the basis may look at Motion::direction
   bool needs_inertia = false;   ///< the basis looks at Motion::inertia
+  bool needs_yielding = false;  ///< the basis looks at Motion::yielding
   /// Terms of one joint each that have the same name here have the same basis: it is evaluated once. Empty: no other
   /// has it.
   std::string column{};

@@ -75,20 +75,6 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
 
 // --- the link is not where the motor is
 
-/// What the torques change by when the joint stands `dq` further on than it was read: shape=(rows, joints).
-MatrixXd torque_change(const Motion& m, Index joint, const VectorXd& dq) {
-  const RigidChain chain(*m.robot);
-  const double step = 1e-4 / std::max(dq.cwiseAbs().maxCoeff(), 1e-12);  // rad: small against any posture
-  const MatrixXd dqd = rate_of(dq, m.step), dqdd = rate_of(dqd, m.step);
-  const MatrixXd made = payload_of(m).isZero(0.0) ? MatrixXd() : chain.torques(m.q, m.qd, m.qdd, m.bodies);
-  const MatrixXd& before = made.size() == 0 ? m.carried : made;
-  MatrixXd q = m.q, qd = m.qd, qdd = m.qdd;
-  q.col(joint) += step * dq;
-  qd.col(joint) += step * dqd;
-  qdd.col(joint) += step * dqdd;
-  return (chain.torques(q, qd, qdd, m.bodies) - before) / step;
-}
-
 /// A term that all joints' torques have.
 TorqueTerm of_all_joints(const Robot& robot, std::string parameter, std::string unit, double prior) {
   if (link_parameters(robot).isZero()) throw Unsuited("the links' masses are not known");
@@ -103,11 +89,10 @@ TorqueTerm of_all_joints(const Robot& robot, std::string parameter, std::string 
 
 // A drive that gives way (Spong 1987): the link stands tau / K behind the motor.
 std::vector<TorqueForm> joint_elasticity(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  const auto at = static_cast<Index>(joint);
   TorqueTerm term = of_all_joints(robot, parameter_name("joint_elasticity", robot, joint),
                                   is_revolute(robot, joint) ? "rad/Nm" : "m/N", 5e-3 / torque_prior(range, joint));
-  term.needs_torque = true;
-  term.basis = [at](const Motion& m) { return torque_change(m, at, -m.torque.col(at)); };
+  term.needs_torque = term.needs_yielding = true;
+  term.basis = [joint](const Motion& m) { return m.yielding[joint]; };
   return {{within(std::move(term), 0.0)}};  // a link stands behind its motor
 }
 
@@ -158,6 +143,7 @@ TorqueForm backlash_over(const Robot& robot, std::size_t joint, double crossed, 
   term.basis = [=](const Motion& m) -> MatrixXd {
     const MatrixXd& inertia = m.inertia[joint];
     const VectorXd load = m.carried.col(at) - before * inertia.col(at).cwiseProduct(m.qdd.col(at));
+    if (load.minCoeff() > 0.0 || load.maxCoeff() < 0.0) return {};  // it lies on one side
     const VectorXd of_link = (1.0 - before) * inertia.col(at);
     const VectorXd place = flight_in_play(load, of_link.cwiseMax(kLeastInertia), crossed, m.step);
     const VectorXd pull = rate_of(rate_of(place, m.step), m.step).col(0) / crossed;
