@@ -86,19 +86,17 @@ class TableSum {
   Gram of(const MatrixXd& table, const std::vector<Index>& rows, const SumOrder& order) {
     const auto count = static_cast<Index>(rows.size());
     const auto columns = static_cast<int>(table.cols());
-    rows_.resize(kTogether, std::max(rows_.cols(), table.cols()));
     sums_.resize(std::max(sums_.size(), kernel::functions().gram_size(columns)), 0.0);
+    places_.resize(static_cast<std::size_t>(columns));
     for (Index done = 0; done < count; done += kTogether) {
       const Index some = std::min(kTogether, count - done), all = RigidChain::padded(some);
-      find_runs(rows.data() + done, some);
-      for (Index c = 0; c < table.cols(); ++c) {
-        const double* const from = table.col(order.columns[static_cast<std::size_t>(c)]).data();
-        double* to = rows_.col(c).data();
-        for (const auto& [first, length] : runs_) to = std::copy_n(from + first, length, to);
-      }
-      rows_.middleRows(some, all - some).setZero();
-      kernel::functions().gram_add(rows_.data(), kTogether, columns, static_cast<int>(order.known),
-                                   static_cast<int>(all), sums_.data());
+      const Index* const these = rows.data() + done;
+      if (some == all && these[some - 1] == these[0] + some - 1)
+        point_into(table, order, these[0]);
+      else
+        copy(table, order, these, some);
+      kernel::functions().gram_add_columns(places_.data(), columns, static_cast<int>(order.known),
+                                           static_cast<int>(all), sums_.data());
     }
     products_.setZero(columns, columns);
     kernel::functions().gram_reduce(sums_.data(), columns, products_.data());
@@ -106,6 +104,23 @@ class TableSum {
   }
 
  private:
+  /// Rows that follow each other stay where they are.
+  void point_into(const MatrixXd& table, const SumOrder& order, Index first) {
+    for (std::size_t c = 0; c < places_.size(); ++c) places_[c] = table.col(order.columns[c]).data() + first;
+  }
+
+  void copy(const MatrixXd& table, const SumOrder& order, const Index* rows, Index count) {
+    rows_.resize(kTogether, std::max(rows_.cols(), table.cols()));
+    find_runs(rows, count);
+    for (std::size_t c = 0; c < places_.size(); ++c) {
+      const double* const from = table.col(order.columns[c]).data();
+      double* to = rows_.col(static_cast<Index>(c)).data();
+      places_[c] = to;
+      for (const auto& [first, length] : runs_) to = std::copy_n(from + first, length, to);
+    }
+    rows_.middleRows(count, RigidChain::padded(count) - count).setZero();
+  }
+
   /// Rows that follow each other are copied together.
   void find_runs(const Index* rows, Index count) {
     runs_.clear();
@@ -136,6 +151,7 @@ class TableSum {
   }
 
   static constexpr Index kTogether = 256;
+  std::vector<const double*> places_;          ///< of the columns, in their order
   std::vector<std::pair<Index, Index>> runs_;  ///< first row, and how many
   MatrixXd rows_;
   std::vector<double> sums_;  ///< the kernel's own: nought between two calls

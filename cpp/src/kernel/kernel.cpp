@@ -348,11 +348,13 @@ bool is_zero(const double* x, int length) {
   return true;
 }
 
-void gram_add(const double* c, std::ptrdiff_t stride, int columns, int known, int length, double* acc) {
+// column(k): where column k is.
+template <typename Column>
+inline void add_products(Column column, int columns, int known, int length, double* acc) {
   // Many columns act now and then only, and what is nought adds nothing.
   constexpr int kMostLooked = 4096;
   bool zero[kMostLooked] = {};
-  for (int k = 0; k < columns && k < kMostLooked; ++k) zero[k] = is_zero(c + stride * k, length);
+  for (int k = 0; k < columns && k < kMostLooked; ++k) zero[k] = is_zero(column(k), length);
   const auto all_zero = [&](int first, int count) {
     for (int k = first; k < first + count && k < columns; ++k)
       if (k >= kMostLooked || !zero[k]) return false;
@@ -364,10 +366,18 @@ void gram_add(const double* c, std::ptrdiff_t stride, int columns, int known, in
     const double* a[kRows];
     const double* b[kCols];
     // Beyond the last column the last one is read again; gram_reduce leaves those products out.
-    for (int m = 0; m < kRows; ++m) a[m] = c + stride * (i + m < columns ? i + m : columns - 1);
-    for (int n = 0; n < kCols; ++n) b[n] = c + stride * (j + n < columns ? j + n : columns - 1);
+    for (int m = 0; m < kRows; ++m) a[m] = column(i + m < columns ? i + m : columns - 1);
+    for (int n = 0; n < kCols; ++n) b[n] = column(j + n < columns ? j + n : columns - 1);
     block_product(a, b, length, acc + at);
   });
+}
+
+void gram_add(const double* c, std::ptrdiff_t stride, int columns, int known, int length, double* acc) {
+  add_products([&](int k) { return c + stride * k; }, columns, known, length, acc);
+}
+
+void gram_add_columns(const double* const* c, int columns, int known, int length, double* acc) {
+  add_products([&](int k) { return c[k]; }, columns, known, length, acc);
 }
 
 void gram_reduce(double* acc, int columns, double* out) {
@@ -466,7 +476,14 @@ void filter(const double* x, int step, const double* weights, int weight_count, 
 #define TRUING_TEXT_OF(x) #x
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const Functions table;
-const Functions table{
-    TRUING_TEXT(TRUING_KERNEL_NAMESPACE), kLanes, evaluate, gram_size, gram_add, gram_reduce, add_squared, filter};
+const Functions table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE),
+                      kLanes,
+                      evaluate,
+                      gram_size,
+                      gram_add,
+                      gram_add_columns,
+                      gram_reduce,
+                      add_squared,
+                      filter};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

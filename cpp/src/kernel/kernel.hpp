@@ -105,6 +105,8 @@ struct Functions {
   /// acc += C^T C of `columns` columns of `length` doubles (a multiple of 8), `stride` apart. Of the first
   /// `known` columns nobody wants the products with each other: some are left out.
   void (*gram_add)(const double* c, std::ptrdiff_t stride, int columns, int known, int length, double* acc);
+  /// The same of columns that stand anywhere.
+  void (*gram_add_columns)(const double* const* c, int columns, int known, int length, double* acc);
   /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
   void (*gram_reduce)(double* acc, int columns, double* out);
   /// out[i] += (sum over k of row[k] c[k * stride + i])^2 for i below `length` (a multiple of kTilePoses).

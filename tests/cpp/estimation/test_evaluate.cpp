@@ -362,6 +362,18 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
         for (int i = 0; i <= j; ++i) CHECK(again[j * columns + i] == out[j * columns + i]);
       }
     }
+    // Columns in any places, some of them nought in all rows.
+    std::vector<double> some = c, placed(columns * columns, 0.0);
+    std::fill(some.begin() + 4 * length, some.begin() + 12 * length, 0.0);
+    std::vector<const double*> places;
+    for (int k = 0; k < columns; ++k) places.push_back(some.data() + k * length);
+    f->gram_add_columns(places.data(), columns, 0, length, acc.data());
+    f->gram_reduce(acc.data(), columns, placed.data());
+    const auto is_nought = [](int k) { return k >= 4 && k < 12; };
+    for (int j = 0; j < columns; ++j) {
+      for (int i = 0; i <= j; ++i)
+        CHECK(placed[j * columns + i] == (is_nought(i) || is_nought(j) ? 0.0 : out[j * columns + i]));
+    }
     // Squares of a row of numbers times the columns.
     std::vector<double> squares(length, 1.0);
     f->add_squared(c.data(), length, expected.data(), columns, length, squares.data());

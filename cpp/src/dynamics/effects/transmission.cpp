@@ -113,9 +113,9 @@ VectorXd flight_in_play(const VectorXd& load, const VectorXd& inertia, double pl
     out[i] = place;
     const bool is_held = on_side && place * load[i - 1] <= 0.0 && place * load[i] <= 0.0;
     if (is_held) continue;
+    const double before = -load[i - 1] / inertia[i], more = -(load[i] - load[i - 1]) / inertia[i];
     for (int part = 0; part < kStepsOfARow; ++part) {
-      const double on = (part + 0.5) / kStepsOfARow;
-      const double pull = -(load[i - 1] + on * (load[i] - load[i - 1])) / inertia[i];
+      const double pull = before + (part + 0.5) / kStepsOfARow * more;
       place += h * (speed + 0.5 * h * pull);
       speed += h * pull;
       if (std::abs(place) < side) continue;
