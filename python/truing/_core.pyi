@@ -2458,6 +2458,12 @@ class FoundEffect:
         Its name, as in `catalogue()`, or that of an effect of one's own.
         """
     @property
+    def grounds(self) -> types.MappingProxyType[str, float]:
+        """
+        What that was worked out from: the class's `posterior` against others, and what speaks for a name or
+        against it.
+        """
+    @property
     def held_out_after(self) -> ErrorStatistics:
         """
         Held-out errors with all named effects.
@@ -7143,6 +7149,11 @@ class FoundTorqueEffect:
     def effect(self) -> str:
         """
         Its name, as in `torque_catalogue()`.
+        """
+    @property
+    def grounds(self) -> types.MappingProxyType[str, float]:
+        """
+        What that was worked out from, as in `FoundEffect`.
         """
     @property
     def joints(self) -> tuple[str, ...]:

@@ -95,9 +95,11 @@ struct Curve {
 
 /// An effect that `diagnose` named.
 struct FoundEffect {
-  std::string effect;                 ///< its name, as in `catalogue()`, or that of an effect of one's own
-  std::vector<std::string> joints;    ///< where
-  double probability = 0.0;           ///< posterior of the class: this effect or one of `confounded_with`
+  std::string effect;               ///< its name, as in `catalogue()`, or that of an effect of one's own
+  std::vector<std::string> joints;  ///< where
+  double probability = 0.0;         ///< posterior of the class: this effect or one of `confounded_with`
+  /// What that was worked out from: the class's `posterior` against others, and what speaks for a name or against it.
+  std::map<std::string, double> grounds;
   std::vector<Parameter> parameters;  ///< values and standard errors
   ErrorStatistics held_out_before;    ///< errors of poses that the fit did not see, without this effect, all others in
   ErrorStatistics held_out_after;     ///< held-out errors with all named effects

@@ -230,6 +230,7 @@ static std::vector<Parameter> parameters_of(const Work& work, const Evidence::St
 
 /// How far the error of unseen poses shrinks by one group, the last one in.
 struct Shrinkage {
+  UnseenErrors without, with;
   ErrorStatistics before, after;
   Share shrink;
   double gap = 0.0;             ///< held-out sum of squares with no group
@@ -242,12 +243,13 @@ static Shrinkage shrinkage_by(const Work& work, const Evidence& evidence, const 
     return held_out_squares(work.grams.test, s.columns, s.solution);
   };
   const Choice less = without(state.choice, work.design.candidates.groups, at);
-  const UnseenErrors before = unseen_errors(work, less), after = unseen_errors(work, state.choice);
   const DiagnoseOptions& options = work.given.options;
   Shrinkage out;
-  out.before = error_statistics(before.length);
-  out.after = error_statistics(after.length);
-  out.shrink = shrinkage(before, after, options.resamples, options.seed + 7);
+  out.without = unseen_errors(work, less);
+  out.with = unseen_errors(work, state.choice);
+  out.before = error_statistics(out.without.length);
+  out.after = error_statistics(out.with.length);
+  out.shrink = shrinkage(out.without, out.with, options.resamples, options.seed + 7);
   out.gap = squares(evidence.evaluate({}));
   out.closed_by_last = squares(evidence.evaluate(less)) - squares(state);
   return out;
@@ -380,7 +382,7 @@ static void add_departures(const Work& work, const Decision& decision, int g, co
 
 /// What the user reads of one group.
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                     const Sureness& sure, double probability, const Identification& refitted) {
+                     const Sureness& sure, const Resampled& resampled, bool unknown, const Identification& refitted) {
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   FoundEffect out;
@@ -388,9 +390,13 @@ FoundEffect describe(const Work& work, const Evidence& evidence, const Decision&
   out.joints = e.joints;
   out.note = e.note;
   out.identify_as = identify_as(e);
-  out.probability = probability;
   out.parameters = parameters_of(work, decision.state, e, refitted);
   const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at);
+  const std::vector<Ground> grounds =
+      grounds_of(work, decision, resampled, g, sure, shrinkage.without, shrinkage.with, unknown);
+  const double probability = confidence(sure.posterior, grounds);
+  out.probability = probability;
+  out.grounds = grounds_told(sure.posterior, grounds);
   out.held_out_before = shrinkage.before;
   out.held_out_after = shrinkage.after;
   out.shrink = shrinkage.shrink;

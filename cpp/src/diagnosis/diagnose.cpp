@@ -33,8 +33,7 @@ using Kind = Explanation::Kind;
 constexpr double kCorrectionShare = 0.05;  ///< of the gap, from which on a law's correction is something unknown
 constexpr double kManyOutliers = 0.05;     ///< of the rows, from which on they are no exceptions
 constexpr double kSmallGain = 0.02;        ///< of the error, that is not worth a line if it may be none
-constexpr double kNamed = 0.5;             ///< a name is given to what is more likely right than wrong
-constexpr double kLawInQuestion = 0.9;     ///< at most so likely is a law that a function of its input does as well as
+constexpr double kLikely = 0.55;           ///< a name's class is taken back where its posterior is less
 
 void refuse_what_cannot_be_used(const Robot& robot, const Measurements& data, const DiagnoseOptions& options) {
   std::string error;
@@ -175,37 +174,21 @@ void say_outliers(const Work& work, const std::vector<std::int32_t>& rows, Diagn
   out->sanity.push_back({"outliers", text, count <= 50 ? out->outliers : std::vector<std::size_t>{}});
 }
 
-/// How sure a named group is, and that as a probability.
-struct Named {
-  Sureness sure;
-  double probability = 0.0;
-};
-
-/// Takes back, one at a time, names that are more likely wrong than right. By group: how sure those are that stay.
-std::map<int, Named> keep_what_is_likely(const Work& work, const Evidence& evidence, const Resampled& resampled,
-                                         Decision* decision) {
+/// Takes back, one at a time, names in whose place others may as well stand. By group: how sure those are that stay.
+std::map<int, Sureness> keep_what_is_likely(const Work& work, const Evidence& evidence, Decision* decision) {
   for (;;) {
-    std::map<int, Named> out;
-    const UnseenErrors with = unseen_errors(work, decision->state.choice);
+    std::map<int, Sureness> out;
+    double least = kLikely;
+    int gone = -1;
     for (std::size_t at = 0; at < decision->state.choice.groups.size(); ++at) {
       const int g = decision->state.choice.groups[at];
       if (!is_named(work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
-      const Sureness sure = how_sure(work, evidence, decision->state, at);
-      const Choice less = without(decision->state.choice, work.design.candidates.groups, at);
-      double probability = calibrated(sure.raw, selection_frequency(work, resampled, sure, g),
-                                      shrink_of(unseen_errors(work, less), with));
-      const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(g)];
-      if (sure.law_in_question || decision->in_question.count(g) || is_function_beside(work, *decision, name))
-        probability = std::min(probability, kLawInQuestion);
-      // Resampled folds of few poses hardly find all links again, though each fold is predicted better with them.
-      const bool holds = links_predict(work, decision->state.choice, at);
-      out[g] = {sure, holds ? std::max(probability, kNamed) : probability};
+      out[g] = how_sure(work, evidence, decision->state, at);
+      if (out[g].posterior >= least || links_predict(work, decision->state.choice, at)) continue;
+      least = out[g].posterior;
+      gone = g;
     }
-    const auto least = std::min_element(out.begin(), out.end(), [](const auto& a, const auto& b) {
-      return a.second.probability < b.second.probability;
-    });
-    if (least == out.end() || least->second.probability >= kNamed) return out;
-    const int gone = least->first;
+    if (gone < 0) return out;
     const std::vector<int>& chosen = decision->state.choice.groups;
     const auto at = std::find(chosen.begin(), chosen.end(), gone) - chosen.begin();
     decision->state =
@@ -401,8 +384,8 @@ void share_the_gap(Diagnosis* out) {
                    [](const UnknownEffect& a, const UnknownEffect& b) { return a.probability > b.probability; });
 }
 
-void describe_all(const Work& work, const Evidence& evidence, const Decision& decision,
-                  const std::map<int, Named>& names, const Identification& refitted, Diagnosis* out) {
+void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled,
+                  const std::map<int, Sureness>& names, const Identification& refitted, Diagnosis* out) {
   const std::vector<int>& chosen = decision.state.choice.groups;
   const std::vector<double> shares = order_averaged_shares(work, evidence, decision.state);
   std::map<int, double> by_corrections;  // of the effects whose law is corrected
@@ -420,11 +403,11 @@ void describe_all(const Work& work, const Evidence& evidence, const Decision& de
     unknown.share = shares[at];
     out->unknown.push_back(std::move(unknown));
   }
+  const bool unknown = !out->unknown.empty() || !decision.too_large.empty();
   for (std::size_t at = 0; at < chosen.size(); ++at) {
     const auto named = names.find(chosen[at]);
     if (named == names.end()) continue;
-    out->effects.push_back(
-        describe(work, evidence, decision, at, named->second.sure, named->second.probability, refitted));
+    out->effects.push_back(describe(work, evidence, decision, at, named->second, resampled, unknown, refitted));
     out->effects.back().share = shares[at] + by_corrections[chosen[at]];
   }
 }
@@ -533,9 +516,9 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   const Evidence evidence = evidence_now(work);
   keep_what_is_confirmed(work, evidence, &decision);
   const Resampled resampled = resample(work, decision);
-  std::map<int, Named> names = keep_what_is_likely(work, evidence, resampled, &decision);
+  std::map<int, Sureness> names = keep_what_is_likely(work, evidence, &decision);
   while (keep_what_is_confirmed(work, evidence, &decision))  // without what was not likely
-    names = keep_what_is_likely(work, evidence, resampled, &decision);
+    names = keep_what_is_likely(work, evidence, &decision);
   for (const auto& [departure, law] : departures_from_laws(work, evidence, decision)) {
     decision.corrects[departure] = law;
     names.erase(departure);
@@ -549,7 +532,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   const std::vector<InputColumn>& inputs = thinned ? of_all_rows : work.inputs;
   const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);
   judge_noise(noise_of_repeats(whole.data), work, decision, &result);
-  describe_all(work, evidence, decision, names, fitted.by_catalogue.found, &result);
+  describe_all(work, evidence, decision, resampled, names, fitted.by_catalogue.found, &result);
   describe_what_is_too_large(work, evidence, decision, &result);
   say_what_is_negative(&result);
   scale_to_exact(&result);

@@ -16,6 +16,7 @@
 #include "diagnosis/linearise.hpp"
 #include "diagnosis/orders.hpp"
 #include "diagnosis/rows.hpp"
+#include "estimation/confidence.hpp"
 #include "estimation/evidence.hpp"
 #include "model/repeats.hpp"
 #include "rooms.hpp"
@@ -104,7 +105,7 @@ struct Rival {
 
 struct Sureness {
   std::vector<Rival> rivals;     ///< those in the class first, by loss
-  double raw = 0.0;              ///< posterior of the class
+  double posterior = 0.0;        ///< of the class
   double removal_loss = 0.0;     ///< nats lost without it
   bool law_in_question = false;  ///< any function of its input does as well, or finds something beside it
 };
@@ -168,6 +169,8 @@ UnseenErrors unseen_errors(const Work& work, const Choice& choice);
 double shrink_of(const UnseenErrors& before, const UnseenErrors& after);
 /// The same, and its 90 % interval over draws of the folds.
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed);
+/// Standard errors, over the rows, by which the length of a row's error falls in the mean.
+double sure_fall(const UnseenErrors& before, const UnseenErrors& after);
 
 constexpr double kContradicted = 0.05;  ///< probability that errors of other poses fall, below which they rise for sure
 constexpr double kConfirmed = 0.95;     ///< the same, from which on they fall for sure
@@ -297,14 +300,14 @@ double best_local_shape(const Work& work, const Evidence& evidence, const Eviden
 bool same_name(const Explanation& a, const Explanation& b);
 bool contains(const Explanation& large, const Explanation& small);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
-/// A function of what the name's law depends on moves the same joint beside it: the law is not quite right.
-bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name);
 /// Names that are what a larger law at their joint leaves of the motion, by group, and the group of that law.
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision);
 Resampled resample(const Work& work, const Decision& decision);
-/// How often the selection on resampled folds finds the group's class again.
-double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group);
-double calibrated(double posterior, double selection_frequency, double gain);
+/// What speaks for a chosen group's name, and against it. Errors of poses that the fit did not see, without it and with
+/// it; `unknown`: something was found that has no name.
+std::vector<Ground> grounds_of(const Work& work, const Decision& decision, const Resampled& resampled, int group,
+                               const Sureness& sure, const UnseenErrors& without, const UnseenErrors& with,
+                               bool unknown);
 
 // --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
 
@@ -335,7 +338,7 @@ double average_with_links(const Registered& whole, const Work& work, const Robot
 // --- describe.cpp: what the user reads -------------------------------------------------------------------------------
 
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
-                     const Sureness& sure, double probability, const Identification& refitted);
+                     const Sureness& sure, const Resampled& resampled, bool unknown, const Identification& refitted);
 /// Fraction of what a free function of one input makes at a joint, that a plain shape (a step, a corner, a bump) makes.
 double share_of_plain_shape(const Work& work, const Decision& decision, int function, std::size_t joint);
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at);

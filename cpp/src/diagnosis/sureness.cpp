@@ -166,13 +166,14 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
     if (rival.in_class) of_class += weight;
     if (rival.in_class || weight > 1e-3) out.rivals.push_back(rival);
   }
-  out.raw = of_class / all;
+  out.posterior = of_class / all;
   std::sort(out.rivals.begin(), out.rivals.end(),
             [](const Rival& a, const Rival& b) { return a.in_class != b.in_class ? a.in_class : a.loss < b.loss; });
   return out;
 }
 
-bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name) {
+/// A function of what the name's law depends on moves the same joint beside it: the law is not quite right.
+static bool is_function_beside(const Work& work, const Decision& decision, const Explanation& name) {
   constexpr double kNats = 2.0;
   if (name.kind != Kind::catalogue || name.joints.size() != 1 || name.period > 0.0) return false;
   const EffectTraits& traits = effect_traits(work, name);
@@ -358,7 +359,7 @@ Resampled resample(const Work& work, const Decision& decision) {
 
 /// Share of the resampled selections that hold the group or one of its class; one more success and one more trial stand
 /// for the data's own.
-double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group) {
+static double selection_frequency(const Work& work, const Resampled& resampled, const Sureness& sure, int group) {
   const auto& named = work.design.candidates.named;
   double back = 1.0, draws = 1.0;
   for (const std::vector<int>& chosen : resampled.chosen) {
@@ -374,15 +375,19 @@ double selection_frequency(const Work& work, const Resampled& resampled, const S
   return back / draws;
 }
 
-/// Stated confidence: the posterior of the class, times how often names were right on development sets of the
-/// examination (docs/method/exam.md) that resampled poses brought back as often, and whose removal raised the error of
-/// poses that the fit did not see by as much. A logistic map (Platt 1999, "Probabilistic outputs for support vector
-/// machines").
-double calibrated(double posterior, double selection_frequency, double gain) {
-  constexpr double kConstant = 0.3, kOfFrequency = 1.8, kOfGain = 9.5;
-  constexpr double kLargeGain = 0.3;  ///< of the error: more says no more
-  const double log_odds = kConstant + kOfFrequency * selection_frequency + kOfGain * std::clamp(gain, 0.0, kLargeGain);
-  return posterior / (1.0 + std::exp(-log_odds));
+// Weights: docs/method/exam.md, "Confidence".
+std::vector<Ground> grounds_of(const Work& work, const Decision& decision, const Resampled& resampled, int group,
+                               const Sureness& sure, const UnseenErrors& without, const UnseenErrors& with,
+                               bool unknown) {
+  constexpr double kSureFall = 20.0;  ///< standard errors: more say no more
+  const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(group)];
+  const bool in_question =
+      sure.law_in_question || decision.in_question.count(group) > 0 || is_function_beside(work, decision, name);
+  return {{"constant", 1.0, -2.6},
+          {"found_again", selection_frequency(work, resampled, sure, group), 3.5},
+          {"log_sure_fall", std::log(std::clamp(sure_fall(without, with), 1.0, kSureFall)), 1.8},
+          {"unknown_found", unknown ? 1.0 : 0.0, -3.4},
+          {"law_in_question", in_question ? 1.0 : 0.0, -1.4}};
 }
 
 }  // namespace truing::diagnosis

@@ -228,6 +228,15 @@ double shrink_of(const UnseenErrors& before, const UnseenErrors& after) {
   return shrink_of(sum_of(before.square_of_fold), sum_of(after.square_of_fold));
 }
 
+double sure_fall(const UnseenErrors& before, const UnseenErrors& after) {
+  const auto n = static_cast<Eigen::Index>(before.length.size());
+  const auto lengths = [&](const UnseenErrors& of) { return Eigen::Map<const Eigen::ArrayXd>(of.length.data(), n); };
+  const Eigen::ArrayXd fall = lengths(before) - lengths(after);
+  const double sigma =
+      (fall - fall.mean()).matrix().norm() / std::sqrt(static_cast<double>(n) * static_cast<double>(n - 1));
+  return fall.mean() / std::max(sigma, 1e-300);
+}
+
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed) {
   const std::size_t folds = before.square_of_fold.size();
   Random random(seed);

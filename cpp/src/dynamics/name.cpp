@@ -10,6 +10,7 @@
 
 #include "dynamics/judge.hpp"
 #include "dynamics/payload.hpp"
+#include "estimation/confidence.hpp"
 #include "math/text.hpp"
 
 namespace truing::dynamics {
@@ -25,7 +26,6 @@ constexpr double kTempered = 0.5;      ///< no model is exact: half a nat counts
 constexpr double kOtherLaws = 0.2;     ///< part of a joint's error that other laws than the catalogue's may well be
 constexpr double kOwnR2 = 0.9;         ///< a free function that makes so much of a law's torque has the law's inputs
 constexpr double kOwnPart = 0.5;       ///< of what a law removes: what it lacks itself removes less
-constexpr double kNamed = 0.5;         ///< what is less likely than not is fitted, and not named
 constexpr double kUnknown = 0.5;       ///< so sure at least must be that there is what nobody knows
 constexpr double kBlocksOfTime = 0.9;  ///< the most that folds of one recording are worth
 constexpr double kMuchWorse = 1.5;     ///< a joint's error that is larger by this factor contradicts what was found
@@ -34,17 +34,6 @@ constexpr double kContradicted = 0.5;  ///< the most that names are worth which 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
 
 bool same_name(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
-
-/// Stated confidence: the posterior of the class, times how often names were right on development sets of the
-/// examination (docs/method/exam.md) that removed as much of a joint's error on folds which were not fitted, and beside
-/// which there was, or was not, something unknown at the joint. A logistic map (Platt 1999, "Probabilistic outputs for
-/// support vector machines") of the logarithm of that part. Whatever is named is no less likely than not.
-double calibrated(double posterior, double part, bool beside_unknown) {
-  constexpr double kOfPart = 2.3, kOfUnknown = -2.0, kLeast = 0.05, kMost = 2.0;
-  const double size = std::log(std::clamp(part, kLeast, kMost) / kOtherLaws);
-  const double log_odds = kOfPart * size + (beside_unknown ? kOfUnknown : 0.0);
-  return std::max(kNamed, posterior / (1.0 + std::exp(-log_odds)));
-}
 
 /// Everything about one chosen group.
 class Naming {
@@ -359,7 +348,10 @@ FoundTorqueEffect as_one(const TorqueDesign& design, const Choice& choice, const
   for (const NamedGroup& one : members) {
     out.joints.push_back(one.found.joints.front());
     out.parameters.insert(out.parameters.end(), one.found.parameters.begin(), one.found.parameters.end());
-    out.probability = std::max(out.probability, one.found.probability);
+    if (one.found.probability > out.probability) {
+      out.probability = one.found.probability;
+      out.grounds = one.found.grounds;
+    }
     out.rms = std::max(out.rms, one.found.rms);
     if (out.plain.empty()) out.plain = one.found.plain;
     at.push_back(one.at);
@@ -403,6 +395,17 @@ std::vector<FoundTorqueEffect> together(const TorqueDesign& design, const Choice
   return out;
 }
 
+/// What speaks for a named effect, and against it. Weights: docs/method/exam.md, "The dynamic half".
+std::vector<Ground> grounds_of(const Naming& naming, std::size_t at, const TorqueGroup& group,
+                               const std::vector<UnknownTorque>& unknown) {
+  constexpr double kLeast = 0.05, kMost = 2.0;  ///< of a joint's error
+  const bool unknown_there = std::any_of(unknown.begin(), unknown.end(), [&](const UnknownTorque& u) {
+    return std::find(group.joints.begin(), group.joints.end(), u.joint) != group.joints.end();
+  });
+  return {{"log_removed", std::log(std::clamp(naming.part_of_joint(at), kLeast, kMost) / kOtherLaws), 2.3},
+          {"unknown_there", unknown_there ? 1.0 : 0.0, -2.0}};
+}
+
 std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Account& account, const Naming& naming,
                                              const std::vector<Noise>& noise, const std::vector<TorqueEffect>& own,
                                              const std::vector<UnknownTorque>& unknown,
@@ -425,10 +428,9 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
       too_small.push_back({std::move(found), k});
       continue;
     }
-    const bool beside_unknown = std::any_of(unknown.begin(), unknown.end(), [&](const UnknownTorque& u) {
-      return std::find(group.joints.begin(), group.joints.end(), u.joint) != group.joints.end();
-    });
-    found.probability = calibrated(posterior, naming.part_of_joint(k), beside_unknown);
+    const std::vector<Ground> grounds = grounds_of(naming, k, group, unknown);
+    found.probability = confidence(posterior, grounds);
+    found.grounds = grounds_told(posterior, grounds);
     if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     found.plain = find_torque_effect(group.effect, own).traits.plain;

@@ -35,6 +35,7 @@ class Named:
     same: tuple[tuple[str, tuple[str, ...]], ...] = ()
     share: float = math.nan  # of the gap's mean square that it is said to close
     order: float = math.nan  # of transmission_error@96
+    grounds: Mapping[str, float] = field(default_factory=dict)  # what its probability was worked out from
 
     def members(self) -> list[tuple[str, tuple[str, ...]]]:
         return [(self.effect, self.joints), *self.same]
@@ -143,7 +144,8 @@ def _named(found: Any) -> Named:
     effect, joints = _known(found)
     same = tuple(_known(other) for other in found.confounded_with)
     probability = _probability(found.probability)
-    return Named(effect, joints, probability, same, float(found.share), _order(found.effect))
+    grounds = dict(getattr(found, "grounds", {}))
+    return Named(effect, joints, probability, same, float(found.share), _order(found.effect), grounds)
 
 
 def _known(item: Any) -> tuple[str, tuple[str, ...]]:

@@ -937,6 +937,17 @@ class Calibration:
     of draws stay below."""
 
 
+def stated_names(sheet: Sheet) -> list[tuple[Named, bool]]:
+    """Every named effect of which it is known whether it is right; of recordings none is."""
+    if sheet.label["source"] == "spike":
+        return []
+    drifts = sheet.label.get("kind") == "drift"
+    return [
+        (item, (drifts and item.effect == "drift") or _excusable(sheet, item))
+        for item in sheet.answer.effects
+    ]
+
+
 def calibration(sheets: Sequence[Sheet]) -> Calibration:
     """Of all named effects. Not of recordings: what else is in these nobody knows."""
     said, true = [], []
@@ -946,16 +957,18 @@ def calibration(sheets: Sequence[Sheet]) -> Calibration:
         if sheet.answer.error:  # as wrong as can be: no answer, for certain
             said.append(1.0)
             true.append(0.0)
-        for item in sheet.answer.effects:
+        for item, is_right in stated_names(sheet):
             said.append(item.probability)
-            drifts = sheet.label.get("kind") == "drift" and item.effect == "drift"
-            true.append(float(drifts or _excusable(sheet, item)))
+            true.append(float(is_right))
     if not said:
         return Calibration(math.nan, math.nan, 0)
     p, hit = np.clip(np.array(said), 0.0, 1.0), np.array(true)
-    return Calibration(
-        float(_calibration_error(p, hit)), float(np.mean((p - hit) ** 2)), len(p), _error_by_chance(p)
-    )
+    return Calibration(calibration_error(p, hit), float(np.mean((p - hit) ** 2)), len(p), _error_by_chance(p))
+
+
+def calibration_error(p: Floats, hit: Floats) -> float:
+    """Of probabilities and hits, shape=(names,)."""
+    return float(_calibration_error(p, hit))
 
 
 def _calibration_error(p: Floats, hit: Floats) -> Floats:

@@ -506,6 +506,8 @@ TEST_CASE("a law that makes most of the motion keeps its name, and what it leave
   REQUIRE(d.effects.size() == 1);
   CHECK(is_named(d, "harmonic", {"J4"}));
   CHECK(d.effects[0].probability <= 0.9);
+  CHECK(d.effects[0].grounds.at("unknown_found") == 1.0);
+  CHECK(d.effects[0].grounds.at("law_in_question") == 1.0);
   CHECK(is_unknown(d, "J4", "q4"));
   // A joint whose sensor is ahead of its gear: half of it follows at once, half late.
   const std::size_t rows = 300;

@@ -37,12 +37,13 @@ struct TorqueAlternative {
 
 /// An effect on the torques that `diagnose` named.
 struct FoundTorqueEffect {
-  std::string effect;                 ///< its name, as in `torque_catalogue()`
-  std::vector<std::string> joints;    ///< where; of a coupling the joint that is moved first, the acting one second
-  bool standard = false;              ///< what everybody fits: inertial parameters, Coulomb, viscous, an offset
-  double probability = 0.0;           ///< posterior of the class: this effect or one of `confounded_with`
-  std::vector<Parameter> parameters;  ///< values and standard errors, constants of its law among them
-  double rms = 0.0;                   ///< [Nm | N] of its torque
+  std::string effect;                     ///< its name, as in `torque_catalogue()`
+  std::vector<std::string> joints;        ///< where; of a coupling the joint that is moved first, the acting one second
+  bool standard = false;                  ///< what everybody fits: inertial parameters, Coulomb, viscous, an offset
+  double probability = 0.0;               ///< posterior of the class: this effect or one of `confounded_with`
+  std::map<std::string, double> grounds;  ///< what that was worked out from, as in `FoundEffect`
+  std::vector<Parameter> parameters;      ///< values and standard errors, constants of its law among them
+  double rms = 0.0;                       ///< [Nm | N] of its torque
   /// Fraction of the squared error that standard practice leaves (of a standard one: that the nominal model leaves)
   /// that it removes, all others in, on recordings that were not fitted; over all joints, each by its noise.
   Share share;

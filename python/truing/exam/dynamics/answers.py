@@ -85,7 +85,8 @@ def _named(found: Any) -> Named:
             f"found the probability {found.probability!r} of {effect}, expected a number from 0 to 1"
         )
     share = getattr(found, "share", math.nan)
-    return Named(effect, joints, probability, same, float(getattr(share, "value", share)))
+    grounds = dict(getattr(found, "grounds", {}))
+    return Named(effect, joints, probability, same, float(getattr(share, "value", share)), grounds=grounds)
 
 
 def _known(item: Any) -> tuple[str, tuple[str, ...]]:
