@@ -22,6 +22,7 @@ constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth anothe
 constexpr double kNoChance = 1.5;     ///< sums of squares that noise alone does not make so unequal
 constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
 constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
+constexpr int kMostTurns = 4;         ///< of search and questions
 constexpr double kWholly = 0.95;      ///< of a function, that a law or a plain shape makes: then it is that
 
 const EffectTraits& effect_traits(const Work& work, const Explanation& e) {
@@ -496,11 +497,14 @@ static double chance_allowed(const Work& work, const Decision& so_far) {
   return gap ? kChance : std::min(kChance, false_alarm);
 }
 
+static bool has_room(const Decision& decision) {
+  return static_cast<int>(decision.state.choice.groups.size()) < decision.search.most_groups;
+}
+
 /// A free function on what is left, if it wins, and what it makes needless goes. True: it was taken.
 static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   const SearchOptions& search = out->search;
-  const bool room = static_cast<int>(out->state.choice.groups.size()) < search.most_groups;
-  if (!room || scan.best.empty() || scan.p > chance_allowed(*work, *out)) return false;
+  if (!has_room(*out) || scan.best.empty() || scan.p > chance_allowed(*work, *out)) return false;
   const FreeGain& best = scan.best.front();
   if (!(best.gain.score > search.threshold + 4.0 && best.gain.share > kFreeShare)) return false;
   append_free(work, best, scan.tried);
@@ -672,6 +676,27 @@ static std::vector<FunctionBeside> functions_beside(const FreeScan& scan) {
   return out;
 }
 
+/// Free functions and orders of gears on what the names leave, the better one first. Returns the next round's seed.
+static std::uint64_t add_what_is_unnamed(Work* work, const Robot& robot, std::uint64_t seed, Gears* gears,
+                                         Decision* out) {
+  constexpr int kMostRounds = 6;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const Evidence evidence = evidence_now(*work);
+    FreeScanOptions scan_options;
+    scan_options.seed = seed++;
+    const FreeScan scan =
+        scan_free(work->design, evidence, out->state, work->inputs, robot, work->noise.design_effect, scan_options);
+    out->p_left = scan.p;
+    out->beside = functions_beside(scan);
+    const OrderAt order = gears->best(evidence, out->state);
+    const bool order_is_better = scan.best.empty() || order.in_noise > scan.best.front().gain.score;
+    if (order_is_better && gears->take(order, out)) continue;
+    if (add_free_function(work, scan, out)) continue;
+    if (order_is_better || !gears->take(order, out)) break;
+  }
+  return seed;
+}
+
 /// Of the candidates that there are.
 static Decision explain(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
@@ -683,24 +708,16 @@ static Decision explain(Work* work, const Robot& robot) {
     out.state = evidence_now(*work).evaluate({});
     return out;
   }
-  // Named effects; then free functions and orders of gears on what they leave, the better one first.
   out.state = search_named(*work, out);
-  for (int round = 0; round < 6; ++round) {
-    const Evidence evidence = evidence_now(*work);
-    FreeScanOptions scan_options;
-    scan_options.seed = options.seed + 101 + static_cast<std::uint64_t>(round);
-    const FreeScan scan =
-        scan_free(work->design, evidence, out.state, work->inputs, robot, work->noise.design_effect, scan_options);
-    out.p_left = scan.p;
-    out.beside = functions_beside(scan);
-    const OrderAt order = gears.best(evidence, out.state);
-    const bool order_is_better = scan.best.empty() || order.in_noise > scan.best.front().gain.score;
-    if (order_is_better && gears.take(order, &out)) continue;
-    if (add_free_function(work, scan, &out)) continue;
-    if (order_is_better || !gears.take(order, &out)) break;
+  // What questions take away leaves room for what there was none for.
+  std::uint64_t seed = options.seed + 101;
+  for (int turn = 0; turn < kMostTurns; ++turn) {
+    seed = add_what_is_unnamed(work, robot, seed, &gears, &out);
+    const bool was_full = !has_room(out);
+    question_bundles(work, robot, &out);
+    question_laws(work, robot, &out);
+    if (!was_full || !has_room(out)) break;
   }
-  question_bundles(work, robot, &out);
-  question_laws(work, robot, &out);
   prefer_links_that_predict(*work, &out);
   if (out.p_gap > options.false_alarm && work->given.beyond_repeats <= kLackOfFit) keep_what_is_no_chance(*work, &out);
   return out;

@@ -8,7 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "support/arms.hpp"
 #include "support/sanitized.hpp"
@@ -28,17 +31,21 @@ Robot arm_without_masses() {
   return robot;
 }
 
-/// Measured where joint `k` stands `beside` what was read; of row and reading.
-std::unique_ptr<Table> measured_beside(std::size_t rows, unsigned seed, std::size_t k,
-                                       const std::function<double(std::size_t, double)>& beside) {
+/// Of row and reading.
+using Beside = std::function<double(std::size_t, double)>;
+
+/// Measured where each of some joints stands beside what was read of it.
+std::unique_ptr<Table> measured_beside(std::size_t rows, unsigned seed, const std::map<std::size_t, Beside>& joints) {
   const Robot robot = arm_without_masses();
   auto table = random_joints(robot, rows, seed);
-  const Column read = table->data.joints[k];
-  std::vector<double> stands(rows);
-  for (std::size_t row = 0; row < rows; ++row) stands[row] = read[row] + beside(row, read[row]);
-  table->data.joints[k] = table->add(stands);
+  const std::vector<Column> read = table->data.joints;
+  for (const auto& [k, beside] : joints) {
+    std::vector<double> stands(rows);
+    for (std::size_t row = 0; row < rows; ++row) stands[row] = read[k][row] + beside(row, read[k][row]);
+    table->data.joints[k] = table->add(stands);
+  }
   measure(table.get(), robot, What::position, kTipNoise, seed + 1);
-  table->data.joints[k] = read;
+  table->data.joints = read;
   return table;
 }
 
@@ -55,7 +62,7 @@ std::string what_was_said(const Diagnosis& d) {
 TEST_CASE("a pack that tightens from an angle on is no wrong ratio beside a harmonic" * doctest::skip(kSanitized)) {
   for (const unsigned seed : {10u, 20u, 30u}) {
     const auto table = measured_beside(
-        200, seed, 2, [](std::size_t, double q) { return 1.6e-4 * std::pow(std::max(0.0, q + 0.2), 1.5); });
+        200, seed, {{2, [](std::size_t, double q) { return 1.6e-4 * std::pow(std::max(0.0, q + 0.2), 1.5); }}});
     const Diagnosis d = diagnose(arm_without_masses(), table->data);
     CAPTURE(seed);
     INFO(what_was_said(d));
@@ -66,13 +73,28 @@ TEST_CASE("a pack that tightens from an angle on is no wrong ratio beside a harm
   }
 }
 
+TEST_CASE("names that were one function leave room for what there was none for" * doctest::skip(kSanitized)) {
+  const auto pack = [](double at, double q) { return std::pow(std::max(0.0, q - at), 1.5); };
+  const auto table = measured_beside(200, 10,
+                                     {{2, [&](std::size_t, double q) { return 1.6e-4 * pack(-0.2, q); }},
+                                      {4, [&](std::size_t, double q) { return 6e-4 * pack(0.6, q); }}});
+  truing::DiagnoseOptions options;
+  options.max_effects = 4;  // taken by names that stand for the two packs, until they are questioned
+  const Diagnosis d = diagnose(arm_without_masses(), table->data, options);
+  INFO(what_was_said(d));
+  CHECK(d.effects.empty());
+  REQUIRE(d.unknown.size() == 2);
+  for (const char* joint : {"J3", "J5"})
+    CHECK(std::any_of(d.unknown.begin(), d.unknown.end(), [&](const auto& u) { return u.joint == joint; }));
+}
+
 TEST_CASE("a first joint that goes with the square of a recorded temperature is no frame that drifts") {
   constexpr std::size_t kRows = 300;
   const auto warmer = [](std::size_t row) {
     return 15.0 * std::sin(3.14 * static_cast<double>(row) / static_cast<double>(kRows));
   };
   const auto table = measured_beside(
-      kRows, 40, 0, [&](std::size_t row, double) { return 3e-5 * std::pow((warmer(row) - 9.5) / 4.6, 2.0); });
+      kRows, 40, {{0, [&](std::size_t row, double) { return 3e-5 * std::pow((warmer(row) - 9.5) / 4.6, 2.0); }}});
   std::vector<double> time(kRows), temperature(kRows);
   for (std::size_t row = 0; row < kRows; ++row) {
     time[row] = 24.0 * static_cast<double>(row);
