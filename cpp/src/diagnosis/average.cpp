@@ -81,6 +81,14 @@ static double likeliest_scale(const Work& work, int links) {
   return evidence.gain(evidence.evaluate({}), columns, 0.0).scale;
 }
 
+bool links_predict_alone(const Work& work) {
+  constexpr double kBetter = 1.05;  // sums of squares
+  const int links = all_links(work);
+  if (links < 0 || !has_few_poses(work, links)) return false;
+  const Choice alone = {{links}, {likeliest_scale(work, links)}};
+  return predicts_better(squares_of_folds(work, alone), squares_of_folds(work, {}), kBetter);
+}
+
 /// Some part of a fit, and the rest of links alone.
 static void mix_in(const Registered& whole, const Work& work, const Robot& robot, const Choice& links, double part,
                    Identification* found) {

@@ -282,7 +282,9 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   Fitted fitted;
   const Refit by_names = refitted(catalogue_groups);
   fitted.by_catalogue = by_names;
-  if (!every_group.empty() || whole.beyond_repeats > kLackOfFit)
+  // That noise alone might score as high does not say, of few poses, that links are right.
+  const bool links_alone = every_group.empty() && !whole.mistaken && links_predict_alone(work);
+  if (!every_group.empty() || links_alone || whole.beyond_repeats > kLackOfFit)
     fitted.part = average_with_links(whole, work, robot, only_these(decision.state.choice, catalogue_groups),
                                      &fitted.by_catalogue.found);
   fitted.by_named = named_groups.size() > catalogue_groups.size() ? refitted(named_groups)

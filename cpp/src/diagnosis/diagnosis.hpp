@@ -330,6 +330,8 @@ double lack_of_fit(const Measurements& data, const std::vector<double>& lengths,
 
 // --- average.cpp: of few poses, two fits in one ----------------------------------------------------------------------
 
+/// Of few poses: do links, under the prior that these speak for, predict the folds better than nothing does?
+bool links_predict_alone(const Work& work);
 /// Of few poses: `found`, the fit of a choice, averaged with one of all links alone under the widest prior, as poses
 /// that neither saw have it. The part that is left of the choice's fit; 1: nothing was averaged.
 double average_with_links(const Registered& whole, const Work& work, const Robot& robot, const Choice& choice,
