@@ -285,14 +285,14 @@ std::optional<BetterOrientations> better_orientations(
     std::vector<void (*)(Position*, Quaternion*)> changes;
   };
   const Other others[] = {
-      {"orientation_order", "reading the orientations' columns as qx qy qz qw, scalar last", {scalar_last}},
+      {"orientation_order", "reading the orientations' columns as qx qy qz qw (scalar last)", {scalar_last}},
       {"orientation_inverse", "taking the inverse of the orientations", {turned_round}},
       {"orientation_inverse",
-       "reading the orientations' columns as qx qy qz qw, scalar last, and taking their inverse",
+       "reading the orientations' columns as qx qy qz qw (scalar last), and taking their inverse",
        {scalar_last, turned_round}},
       {"pose_inverse", "taking the inverse of the measured poses", {inverted}},
       {"pose_inverse",
-       "reading the orientations' columns as qx qy qz qw, scalar last, and taking the inverse of the measured poses",
+       "reading the orientations' columns as qx qy qz qw (scalar last), and taking the inverse of the measured poses",
        {scalar_last, inverted}},
   };
   std::vector<std::int32_t> rows(data.rows);

@@ -94,16 +94,16 @@ TEST_CASE("orientations that are scalar last, turned round or of inverse poses a
       change_poses(table.get(), change);
       check_said(robot, table->data, kind, words);
     };
-    said_of("orientation_order", "qx qy qz qw, scalar last leaves", [&](auto*, auto* q) { *q = scalar_last(*q); });
+    said_of("orientation_order", "qx qy qz qw (scalar last) leaves", [&](auto*, auto* q) { *q = scalar_last(*q); });
     said_of("orientation_inverse", "inverse of the orientations", [&](auto*, auto* q) { *q = q->conjugate(); });
-    said_of("orientation_inverse", "scalar last, and taking their inverse",
+    said_of("orientation_inverse", "(scalar last), and taking their inverse",
             [&](auto*, auto* q) { *q = scalar_last(q->conjugate()); });
     const auto invert = [](auto* p, auto* q) {
       *q = q->conjugate();
       *p = -(*q * *p);
     };
     said_of("pose_inverse", "taking the inverse of the measured poses", invert);
-    said_of("pose_inverse", "scalar last, and taking the inverse of the measured poses", [&](auto* p, auto* q) {
+    said_of("pose_inverse", "(scalar last), and taking the inverse of the measured poses", [&](auto* p, auto* q) {
       invert(p, q);
       *q = scalar_last(*q);
     });
