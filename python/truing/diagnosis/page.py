@@ -33,7 +33,7 @@ from truing.report.page import Page, footer, part_of_page, table_cell, warnings_
 from truing.report.rows import Rows
 from truing.report.scene import RobotPicture
 from truing.report.trust import GOOD, LOOK, Check, check_items
-from truing.report.words import counted, escaped, figures_text, length_text, length_unit
+from truing.report.words import counted, escaped, figures_text, length_text, length_unit, sure_text
 
 Floats = NDArray[np.float64]
 # Of effects, most first; apart for colour-blind readers, and none is that of before, after, noise or the
@@ -1092,7 +1092,7 @@ def _percent(share: float | None) -> str:
 def _sure(probability: float | None) -> str:
     if probability is None:
         return ""
-    return "more than 99 % sure" if probability > 0.99 else f"{100 * probability:.0f} % sure"
+    return f"{sure_text(probability).replace('> ', 'more than ')} sure"
 
 
 def contender(effect: Mapping[str, Any]) -> Mapping[str, Any] | None:

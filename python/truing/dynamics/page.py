@@ -22,7 +22,7 @@ from truing.dynamics.rollout.page import joint_menu, response_card, rollout_card
 from truing.report.charts import AFTER, BEFORE, INK, MUTED, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, table_cell, warnings_card
 from truing.report.scene import RobotPicture
-from truing.report.words import counted, escaped, figures_text
+from truing.report.words import counted, escaped, figures_text, sure_text
 
 Floats = NDArray[np.float64]
 NOMINAL, UNKNOWN = "#98a2ad", "#8a5bb5"
@@ -575,7 +575,6 @@ def _folded(title: str, effects: Sequence[Mapping[str, Any]]) -> str:
 def _cause_line(effect: Mapping[str, Any]) -> str:
     share, (low, high) = effect["share"] or 0.0, effect["ci"]
     width = max(1, round(BAR * min(1.0, max(0.0, share))))
-    sure = effect["probability"]
     maybe = others(effect)
     interval = "" if low is None or high is None else f"{100 * low:.1f} to {min(100.0, 100 * high):.1f}"
     removes = (
@@ -589,7 +588,7 @@ def _cause_line(effect: Mapping[str, Any]) -> str:
         f'<tr><td>{escaped(plain(effect))}<span class="maybe">{escaped(maybe)}</span></td>'
         f"<td>{escaped(place(effect).removeprefix('at '))}</td><td>{removes}</td>"
         f'<td class="n">{size}</td>'
-        f"<td>{'> 99 %' if sure > 0.99 else f'{100 * sure:.0f} %'}</td>"
+        f"<td>{escaped(sure_text(effect['probability']))}</td>"
         f'<td class="wide">{escaped(size_text(effect))}</td></tr>'
     )
 
@@ -798,7 +797,8 @@ def _unknown(page: Page, result: Mapping[str, Any]) -> None:
     items = "".join(
         f"<li>{escaped(u['joint'])}: goes with {escaped(_listed(u['inputs']))},"
         f" {figures_text(u['rms_Nm'] or 0.0)}"
-        f" Nm rms, removes {100 * (u['share'] or 0.0):.1f} % ({100 * u['probability']:.0f} % sure)</li>"
+        f" Nm rms, removes {100 * (u['share'] or 0.0):.1f} %"
+        f" ({escaped(sure_text(u['probability']))} sure)</li>"
         for u in result["unknown"]
     )
     page.add(f'<ul class="plain">{items}</ul></section>')

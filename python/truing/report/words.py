@@ -50,6 +50,11 @@ def length_text(metres: float | None) -> str:
     return f"{figures_text(metres * scale)}\u202f{unit}"
 
 
+def sure_text(probability: float) -> str:
+    """A confidence; nothing is said to be wholly certain."""
+    return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
+
+
 def angle_text(radians: float) -> str:
     return (
         f"{figures_text(math.degrees(radians))}°"

@@ -29,6 +29,7 @@ from truing.report.arrays import outline, packed, unpacked
 from truing.report.page import Page
 from truing.report.picture import chart_picture
 from truing.report.scene import Scene3d
+from truing.report.words import sure_text
 
 WEB = Path(__file__).resolve().parents[3] / "web"
 EVIL = "</script><img src=x onerror=alert(1)>"
@@ -42,6 +43,10 @@ def shapes(data: list[dict[str, Any]], layout: dict[str, Any] | None = None) -> 
 
 def file_of_report(name: str) -> str:
     return (resources.files("truing") / "report" / name).read_text(encoding="utf-8")
+
+
+def test_nothing_is_said_to_be_wholly_certain() -> None:
+    assert [sure_text(p) for p in (0.5, 0.987, 0.9962)] == ["50 %", "99 %", "> 99 %"]
 
 
 def test_the_script_is_allowed_by_its_digest_and_nothing_else_is() -> None:

@@ -172,9 +172,9 @@ def cause_lines(result: Mapping[str, Any]) -> list[tuple[str, ...]]:
 
 def cause_line(found: Mapping[str, Any], name: str, size: str) -> tuple[str, ...]:
     """Fraction of the gap, rms motion of the tip, rms error without it, how sure, size."""
-    from truing.report.words import length_text
+    from truing.report.words import length_text, sure_text
 
-    sure = f"{100 * found['probability']:.0f} %"
+    sure = sure_text(found["probability"])
     if not found.get("inputs", True):  # what no function describes has no size
         return name, "–", "–", "–", sure, size
     without = length_text(found["held_out"]["before_rms_m"])

@@ -30,7 +30,7 @@ from truing.dynamics.page import (
 from truing.dynamics.rollout.page import error_text, joint_menu, motion_chart
 from truing.report.charts import AFTER, BEFORE, INK, faded, labelled_bars, packed
 from truing.report.page import Page, footer, part_of_page, warnings_card
-from truing.report.words import counted, escaped, figures_text
+from truing.report.words import counted, escaped, figures_text, sure_text
 
 Floats = NDArray[np.float64]
 NOMINAL, UNKNOWN = "#98a2ad", "#8a5bb5"
@@ -464,8 +464,8 @@ def _unknown(page: Page, result: Mapping[str, Any]) -> None:
         words = " and ".join(name.replace("_", " ") for name in one["inputs"])
         page.add(
             f"<p>At <b>{escaped(one['joint'])}</b> something goes with {escaped(words)}"
-            f" ({100 * (one['probability'] or 0.0):.0f} % sure, {100 * (one['share'] or 0.0):.1f} % of the"
-            " squared error).</p>"
+            f" ({escaped(sure_text(one['probability'] or 0.0))} sure,"
+            f" {100 * (one['share'] or 0.0):.1f} % of the squared error).</p>"
         )
         curve = np.array(one["curve"], dtype=float).reshape(-1, 3)
         if len(curve) > 1:

@@ -188,6 +188,8 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
 
 def print_servo(result: Mapping[str, Any]) -> None:
     """The verdict from commands, errors by joint, the causes, and what the recordings cannot tell."""
+    from truing.report.words import sure_text
+
     print_findings(result)
     say(result["sentence"])
     found = result["rollout"]
@@ -204,7 +206,7 @@ def print_servo(result: Mapping[str, Any]) -> None:
         (
             f"{e['effect'].replace('_', ' ')} {', '.join(e['joints'])}",
             f"{100 * e['share']:.1f} %",
-            f"{100 * e['probability']:.0f} %",
+            sure_text(e["probability"]),
             e["sentence"].rpartition(": ")[2],
         )
         for e in result["effects"]
@@ -239,10 +241,11 @@ def print_rollout(result: Mapping[str, Any]) -> None:
 def cause_lines(result: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     """What was named beyond standard practice, as in the report's table."""
     from truing.dynamics.page import beyond_standard, is_load, others, place, size_text
+    from truing.report.words import sure_text
 
     lines = []
     for effect in beyond_standard(result):
         name = " ".join(filter(None, (effect["effect"].replace("_", " "), place(effect), others(effect, 1))))
         removes = "first" if is_load(effect) else f"{100 * (effect['share'] or 0.0):.1f} %"
-        lines.append((name, removes, f"{100 * effect['probability']:.0f} %", size_text(effect)))
+        lines.append((name, removes, sure_text(effect["probability"]), size_text(effect)))
     return lines
