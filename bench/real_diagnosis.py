@@ -72,7 +72,7 @@ def millimetres(statistics: truing.common.ErrorStatistics | Errors) -> str:
 def named(found: truing.diagnosis.Diagnosis) -> str:
     names = [
         f"{effect.effect}{' ' + '+'.join(effect.joints) if 0 < len(effect.joints) <= 2 else ''}"
-        f" ({effect.probability:.2f})"
+        f" ({'> 0.99' if effect.probability >= 0.995 else f'{effect.probability:.2f}'})"
         for effect in found.effects
     ]
     return (
