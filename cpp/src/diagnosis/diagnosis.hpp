@@ -165,9 +165,7 @@ double stacked_part(const Work& work, const Average& one, const Choice& other);
 bool predicts_better(const Eigen::VectorXd& one, const Eigen::VectorXd& other, double factor);
 /// Of every training fold by a fit to the others, and of the poses held out by the fit to all training folds.
 UnseenErrors unseen_errors(const Work& work, const Choice& choice);
-/// Fraction by which the root mean square shrinks.
-double shrink_of(const UnseenErrors& before, const UnseenErrors& after);
-/// The same, and its 90 % interval over draws of the folds.
+/// Fraction by which the root mean square shrinks, and its 90 % interval over draws of the folds.
 Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws, std::uint64_t seed);
 /// Standard errors, over the rows, by which the length of a row's error falls in the mean.
 double sure_fall(const UnseenErrors& before, const UnseenErrors& after);

@@ -224,10 +224,6 @@ static double sum_of(const std::vector<double>& v) { return std::accumulate(v.be
 
 static double shrink_of(double from, double to) { return 1.0 - std::sqrt(to / std::max(from, 1e-300)); }
 
-double shrink_of(const UnseenErrors& before, const UnseenErrors& after) {
-  return shrink_of(sum_of(before.square_of_fold), sum_of(after.square_of_fold));
-}
-
 double sure_fall(const UnseenErrors& before, const UnseenErrors& after) {
   const auto n = static_cast<Eigen::Index>(before.length.size());
   const auto lengths = [&](const UnseenErrors& of) { return Eigen::Map<const Eigen::ArrayXd>(of.length.data(), n); };
@@ -250,7 +246,7 @@ Share shrinkage(const UnseenErrors& before, const UnseenErrors& after, int draws
     }
     drawn.push_back(shrink_of(from, to));
   }
-  return percentile_interval(std::move(drawn), shrink_of(before, after));
+  return percentile_interval(std::move(drawn), shrink_of(sum_of(before.square_of_fold), sum_of(after.square_of_fold)));
 }
 
 }  // namespace truing::diagnosis
