@@ -226,7 +226,7 @@ bool find_turned(const Robot& robot, const DiagnoseOptions& options, Checked* ou
   };
   if (!out->data.orientation[0]) return false;
   const auto better = better_orientations(robot, out->data, errors);
-  if (better) out->findings.push_back({better->reading.kind, text_of(*better) + ".", {}, true});
+  if (better) out->findings.push_back({better->reading.kind, text_of(*better), {}, true});
   return better.has_value();
 }
 

@@ -342,7 +342,7 @@ Mistake late(const Trials::Lag& lag, std::vector<Parameter> changes) {
 }
 
 Mistake turned(const BetterOrientations& better, std::vector<Parameter> changes) {
-  return {better.reading.kind, text_of(better) + ".", std::move(changes)};
+  return {better.reading.kind, text_of(better), std::move(changes)};
 }
 
 Mistake unexplained(std::vector<Parameter> changes) {

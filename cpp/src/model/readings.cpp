@@ -315,7 +315,7 @@ std::optional<BetterOrientations> better_orientations(
 
 std::string text_of(const BetterOrientations& better) {
   return better.reading.text + " leaves a rotation error of " + degrees(better.left) + " in place of " +
-         degrees(better.as_is) + " with base and tool fitted. Correct it and run again";
+         degrees(better.as_is) + " with base and tool fitted. Correct it and run again.";
 }
 
 std::vector<std::function<Reading()>> readings_of(const Robot& robot, const Measurements& data) {

@@ -41,7 +41,7 @@ struct BetterOrientations {
 std::optional<BetterOrientations> better_orientations(
     const Robot& robot, const Measurements& data, const std::function<ErrorStatistics(const Measurements&)>& errors);
 
-/// What it explains, and what to do; without a full stop.
+/// What it explains, and what to do, in sentences.
 std::string text_of(const BetterOrientations& better);
 
 /// The joints of every row with what was measured `shift` rows further down. Rows that have no such row are the last
