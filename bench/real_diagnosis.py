@@ -95,10 +95,10 @@ def unknown(found: truing.diagnosis.Diagnosis) -> str:
 
 def rows(folder: Path) -> Iterator[str]:
     yield (
-        "| set | base and tool | geometry | named effects | and unknown ones | named (probability) | unknown"
-        " | left to a nearest neighbour | seconds |"
+        "| set | base and tool | geometry | named effects | and unknown ones | robot.yaml | with tables"
+        " | named (probability) | unknown | left to a nearest neighbour | seconds |"
     )
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     for recording in (*RECORDINGS, *ARMS):
         line = one(folder, recording)
         if line:
@@ -108,7 +108,7 @@ def rows(folder: Path) -> Iterator[str]:
 
 def one(folder: Path, recording: Recording) -> str:
     if not (folder / recording.folder).is_dir():
-        return f"| {recording.name} | not there | | | | | | | |"
+        return f"| {recording.name} | not there | | | | | | | | | |"
     robot, data = load(folder, recording)
     started = time.perf_counter()
     found = truing.diagnose(robot, data)
@@ -116,9 +116,16 @@ def one(folder: Path, recording: Recording) -> str:
     geometry = on_the_same_rows(found, fit(robot, data), data)
     return (
         f"| {recording.name} | {millimetres(found.gap)} | {millimetres(geometry) if geometry else '–'}"
-        f" | {millimetres(found.after)} | {millimetres(found.after_unknown)} | {named(found)} |"
-        f" {unknown(found)} | {100 * found.neighbour_share:.0f} % | {seconds:.1f} |"
+        f" | {millimetres(found.after)} | {millimetres(found.after_unknown)} | {robots(found)}"
+        f" | {named(found)} | {unknown(found)} | {100 * found.neighbour_share:.0f} % | {seconds:.1f} |"
     )
+
+
+def robots(found: truing.diagnosis.Diagnosis) -> str:
+    """What the robots leave that are handed over: two cells, rms."""
+    by_tables = found.after_robot_with_unknown.rms if found.robot_with_unknown else None
+    by_names = found.gap.rms * (1.0 - found.shrink.value)
+    return f"{1e3 * by_names:.3f} | {'–' if by_tables is None else f'{1e3 * by_tables:.3f}'}"
 
 
 def on_the_same_rows(

@@ -2784,6 +2784,11 @@ class Diagnosis:
         Held-out errors with all named effects, corrections of their laws and drifts included.
         """
     @property
+    def after_robot_with_unknown(self) -> ErrorStatistics:
+        """
+        Held-out errors by `robot_with_unknown`.
+        """
+    @property
     def after_unknown(self) -> ErrorStatistics:
         """
         Held-out errors with the unknown functions as well.
@@ -2923,6 +2928,13 @@ class Diagnosis:
     def robot_before(self) -> Robot:
         """
         Nominal, with base and targets (and anchor) fitted; part of this result: copy it to change it.
+        """
+    @property
+    def robot_with_unknown(self) -> Robot | None:
+        """
+        The same with the unknown functions of joint motions, directions, gravity torques, payload and
+        temperature, as tables (effect lookup_table). None: there are none, or held-out poses do not gain by
+        them for sure.
         """
     @property
     def sanity(self) -> tuple[SanityFinding, ...]:

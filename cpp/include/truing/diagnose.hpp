@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -233,9 +234,13 @@ struct Diagnosis {
   Robot
       robot_before;  ///< nominal, with base and targets (and anchor) fitted; part of this result: copy it to change it
   Robot robot;       ///< with the effects that were named, free functions left out; part of this result
-  std::string joint_record;           ///< 'q' or 'qr': the record that explains the measurements better
-  std::vector<std::string> warnings;  ///< what to know before trusting it
-  std::uint64_t seed = 0;             ///< of the split and of every simulation
+  /// The same with the unknown functions of joint motions, directions, gravity torques, payload and temperature, as
+  /// tables (effect lookup_table). None: there are none, or held-out poses do not gain by them for sure.
+  std::optional<Robot> robot_with_unknown;
+  ErrorStatistics after_robot_with_unknown;  ///< held-out errors by `robot_with_unknown`
+  std::string joint_record;                  ///< 'q' or 'qr': the record that explains the measurements better
+  std::vector<std::string> warnings;         ///< what to know before trusting it
+  std::uint64_t seed = 0;                    ///< of the split and of every simulation
 };
 
 /// Where the gap between robot and model lies, which effect causes it, and how far it shrinks.

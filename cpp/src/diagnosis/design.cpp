@@ -509,6 +509,38 @@ Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coeffici
   return effect;
 }
 
+bool fits_in_tables(const Explanation& candidate, const std::vector<InputColumn>& inputs) {
+  if (candidate.kind != Kind::law && candidate.kind != Kind::free) return false;
+  if (candidate.law_test == LawTest::times_the_lengths) return false;
+  return std::all_of(candidate.inputs.begin(), candidate.inputs.end(),
+                     [&](int input) { return is_input_of_tables(inputs[static_cast<std::size_t>(input)].name); });
+}
+
+std::vector<LookupTable> tables_of(const Explanation& candidate, const Eigen::VectorXd& coefficients,
+                                   const std::vector<InputColumn>& inputs, const Robot& robot) {
+  LookupTable table{"", {}, candidate.knots, {}};
+  for (const int input : candidate.inputs) table.inputs.push_back(inputs[static_cast<std::size_t>(input)].name);
+  Eigen::Index hats = 1;
+  for (const std::vector<double>& knots : candidate.knots) hats *= static_cast<Eigen::Index>(knots.size());
+  const bool halved = candidate.kind == Kind::law && candidate.law_test == LawTest::times_direction;
+  if (halved) {  // direction / 2 times the function: linear in the direction as well
+    const int joint = inputs[static_cast<std::size_t>(candidate.inputs[0])].joint;
+    table.inputs.push_back(input_name(Driver::direction, static_cast<std::size_t>(joint)));
+    table.knots.push_back({-1.0, 1.0});
+  }
+  std::vector<LookupTable> out;
+  for (const auto& place : places_of(candidate, robot)) {
+    table.site = place.first;
+    table.values.clear();
+    for (const double value : coefficients.segment(static_cast<Eigen::Index>(out.size()) * hats, hats)) {
+      if (halved) table.values.push_back(-0.5 * value);
+      table.values.push_back(halved ? 0.5 * value : value);
+    }
+    out.push_back(table);
+  }
+  return out;
+}
+
 Design make_design(const DesignTask& task) {
   Design out;
   out.candidates = make_candidates(task);

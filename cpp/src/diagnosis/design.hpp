@@ -12,6 +12,7 @@
 
 #include "diagnosis/candidates.hpp"
 #include "estimation/evidence.hpp"
+#include "model/effects/tables.hpp"
 #include "rooms.hpp"
 
 namespace truing::diagnosis {
@@ -53,5 +54,12 @@ Design::Rows free_columns(const Design& design, const std::vector<int>& site_col
 /// times one parameter. Its basis is looked up by row of `inputs`.
 Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coefficients,
                    const std::vector<InputColumn>& inputs);
+
+/// Whether a robot can carry the function: of inputs that every row has that it is asked about.
+bool fits_in_tables(const Explanation& candidate, const std::vector<InputColumn>& inputs);
+
+/// The effect's functions at its sites as a robot carries them.
+std::vector<LookupTable> tables_of(const Explanation& candidate, const Eigen::VectorXd& coefficients,
+                                   const std::vector<InputColumn>& inputs, const Robot& robot);
 
 }  // namespace truing::diagnosis

@@ -270,11 +270,12 @@ struct Fitted {
 Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs,
                    const Robot& robot, const Decision& decision, const Resampled& resampled, Diagnosis* out) {
   const std::vector<int>& every_group = decision.state.choice.groups;
-  std::vector<int> named_groups, catalogue_groups;
+  std::vector<int> named_groups, catalogue_groups, tabled_groups;
   for (const int g : every_group) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     if (e.kind != Kind::free || corrects_a_law(decision, g)) named_groups.push_back(g);
     if (is_in_catalogue(e)) catalogue_groups.push_back(g);
+    if (is_in_catalogue(e) || fits_in_tables(e, inputs)) tabled_groups.push_back(g);
   }
   const auto refitted = [&](const std::vector<int>& groups) {
     return refit(whole, work, inputs, robot, decision.state, groups);
@@ -312,8 +313,17 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   };
   if (!every_group.empty())
     out->held_out_fall = fall_to(named_groups.empty() ? lengths(fitted.after_all) : out->error_after);
-  if (catalogue_groups.empty() && fitted.part == 1.0) return fitted;
   const std::vector<double> by_robot = lengths(left_by(out->robot, whole.options.own_effects));
+  if (tabled_groups.size() > catalogue_groups.size()) {
+    const Refit& by_tables = tabled_groups.size() == every_group.size() ? fitted.by_all : refitted(tabled_groups);
+    Robot tabled = with_tables(work, inputs, decision.state, tabled_groups, by_tables);
+    const std::vector<double> errors = lengths(left_by(tabled, whole.options.own_effects));
+    if (fall_of(by_robot, errors, whole.set, whole.cluster).probability > kConfirmed) {
+      out->robot_with_unknown = std::move(tabled);
+      out->after_robot_with_unknown = judged(errors);
+    }
+  }
+  if (catalogue_groups.empty() && fitted.part == 1.0) return fitted;
   fitted.by_robot = fall_to(by_robot);
   out->shrink =
       percentile_interval(resampled.shrink, out->gap.rms > 0.0 ? 1.0 - judged(by_robot).rms / out->gap.rms : 0.0);
@@ -457,6 +467,7 @@ void decide_on_robot(const Robot& frames_alone, const Fitted& fitted, Diagnosis*
     return;
   }
   out->robot = frames_alone;
+  out->robot_with_unknown.reset();
   out->shrink = {};
 }
 

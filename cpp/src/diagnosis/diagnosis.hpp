@@ -323,6 +323,9 @@ RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, c
 /// `inputs` are those of the whole.
 Refit refit(const Registered& whole, const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
             const Evidence::State& state, const std::vector<int>& groups);
+/// The robot as refitted to these groups, its functions as tables, which a robot file can hold.
+Robot with_tables(const Work& work, const std::vector<InputColumn>& inputs, const Evidence::State& state,
+                  const std::vector<int>& groups, const Refit& refitted);
 double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,
                    const Repeats& repeats);
 

@@ -174,6 +174,25 @@ Refit refit(const Registered& whole, const Work& work, const std::vector<InputCo
   return out;
 }
 
+Robot with_tables(const Work& work, const std::vector<InputColumn>& inputs, const Evidence::State& state,
+                  const std::vector<int>& groups, const Refit& refitted) {
+  Robot out = refitted.found.robot;
+  for (const int g : groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    if (!fits_in_tables(e, inputs)) continue;
+    const Eigen::VectorXd shape =
+        solutions_of(state, work.design.candidates.groups[static_cast<std::size_t>(g)].columns);
+    const std::string name = free_effect(e, shape, inputs).name;
+    const auto applied = std::find_if(out.effects.begin(), out.effects.end(),
+                                      [&](const AppliedEffect& effect) { return effect.effect == name; });
+    if (applied == out.effects.end()) continue;
+    const double times = applied->parameters.at(name);
+    out.effects.erase(applied);
+    for (const LookupTable& table : tables_of(e, times * shape, inputs, out)) add_table(table, &out);
+  }
+  return out;
+}
+
 /// By how many standard errors held-out errors exceed the noise that repeats show, and the 5 % that fitting a few
 /// frames may add. Of medians: a few rows far out are no lack of fit.
 double lack_of_fit(const Measurements& data, const std::vector<double>& lengths, const std::vector<std::int8_t>& set,

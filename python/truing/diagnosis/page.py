@@ -143,8 +143,8 @@ def _corrected(result: Mapping[str, Any]) -> str:
 
 
 def _fall(result: Mapping[str, Any]) -> str:
-    """How far the error falls: with the effects named, with free functions, and by the robot file alone where
-    that is less.
+    """How far the error falls: with the effects named, with free functions, and by the robot files where they
+    differ.
     """
     gap, after, by_all, shrink = (
         result["gap"]["rms_m"] or 0.0,
@@ -172,6 +172,8 @@ def _fall(result: Mapping[str, Any]) -> str:
             f" {'a free function' if len(free) == 1 else 'free functions'} "
             f"for what is unknown{'' if texts else ', not by anything known'}"
         )
+    if tables := result["after_robot_with_unknown"]:
+        texts.append(f"{length_text(tables['rms_m'])} by robot_with_unknown.yaml, which has these as tables")
     return "; ".join(texts)
 
 

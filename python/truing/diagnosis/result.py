@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ``truing diagnose`` writes: ``result.json``, ``residuals.csv``, ``next_poses.csv`` and the robot."""
+"""What ``truing diagnose`` writes: ``result.json``, ``residuals.csv``, ``next_poses.csv`` and the robots."""
 
 from __future__ import annotations
 
@@ -73,6 +73,8 @@ def diagnosis_dict(found: _core.Diagnosis, *, warnings: Iterable[str] = ()) -> d
         },
         "after": {**statistics_dict(found.after), "remaining_structure_p": found.remaining_structure_p},
         "after_unknown": statistics_dict(found.after_unknown),
+        "after_robot_with_unknown": found.robot_with_unknown
+        and statistics_dict(found.after_robot_with_unknown),
         "shrink": {"value": found.shrink.value, "ci": _interval(found.shrink)},
         "held_out_fall": {
             "poses": found.held_out_fall.poses,
@@ -307,6 +309,18 @@ def write_diagnosis(
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
     own = found.gap.rms * (1.0 - found.shrink.value)  # the robot file holds no drifts and no free functions
     write_robot(folder, found.robot, source, {"rms_m": own}, nominal_file, base_link, tip_link)
+    if found.robot_with_unknown is not None:
+        by_tables = {"rms_m": found.after_robot_with_unknown.rms}
+        write_robot(
+            folder,
+            found.robot_with_unknown,
+            source,
+            by_tables,
+            nominal_file,
+            base_link,
+            tip_link,
+            "robot_with_unknown",
+        )
     write_table(
         folder / "residuals.csv",
         diagnosis_columns(rows, data, [target.name for target in found.robot.targets], found.directions),

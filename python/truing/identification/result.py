@@ -395,11 +395,12 @@ def write_robot(
     nominal_file: Path | None,
     base_link: str,
     tip_link: str,
+    stem: str = "robot",
 ) -> None:
     """Writes ``robot.yaml`` in the units of the nominal file, and ``robot.urdf`` if that was URDF (of MJCF
-    only the former)."""
+    only the former). `stem`: another name."""
     save_robot(
-        folder / "robot.yaml",
+        folder / f"{stem}.yaml",
         robot,
         units=load_units(nominal_file) if nominal_file else None,
         calibration={
@@ -412,7 +413,7 @@ def write_robot(
         return
     if robot.convention == "urdf":
         text = nominal_file.read_text(encoding="utf-8-sig")
-        (folder / "robot.urdf").write_text(
+        (folder / f"{stem}.urdf").write_text(
             _core.urdf_with_calibration(text, robot, base_link, tip_link), encoding="utf-8"
         )
 

@@ -176,6 +176,7 @@ CONTRACT = {
     "unknown": [UNKNOWN],
     "after": {"rms_m": NUMBER, "remaining_structure_p": MAYBE},
     "after_unknown": {"rms_m": NUMBER, "n": int},
+    "after_robot_with_unknown": (dict, type(None)),
     "shrink": {"value": NUMBER, "ci": CI},
     "held_out_fall": {"poses": int, "mean_m": NUMBER, "sigma_m": NUMBER, "probability": NUMBER},
     "not_testable": [{"effect": str, "joints": TEXTS, "why": str}],
@@ -302,6 +303,42 @@ def test_the_robot_file_holds_what_was_named(case: str) -> None:
     )
     if case == "effects":  # neither drifts nor corrections of laws: the robot is all that was named
         assert rms == pytest.approx(result["after"]["rms_m"], rel=1e-6)
+
+
+def test_a_robot_that_has_the_unknown_as_tables_leaves_what_is_said(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    data = measured("effects+unknown")
+    result = diagnosed(data)
+    assert "robot_with_unknown.yaml" in capsys.readouterr().out
+    assert "robot_with_unknown.yaml" in Path("found/report.html").read_text()
+    robot = truing.load_robot("found/robot_with_unknown.yaml")
+    held_out = np.array(columns("found/residuals.csv")["set"]) == "test"
+    left = np.asarray(truing.predict(robot, data).position) - np.asarray(data.positions)
+    rms = np.sqrt(np.mean(np.sum(left[held_out] ** 2, axis=1)))
+    said = result["after_robot_with_unknown"]["rms_m"]
+    assert rms == pytest.approx(said, rel=1e-5) and said == pytest.approx(
+        result["after_unknown"]["rms_m"], rel=0.02
+    )
+    assert said < 0.5 * result["after"]["rms_m"]  # of robot.yaml
+
+
+def test_the_real_robot_reaches_its_targets_where_commands_go_by_the_tables() -> None:
+    diagnosed(measured("unknown", orientation=True))
+    nominal, found = truing.load_robot(ROBOT), truing.load_robot("found/robot_with_unknown.yaml")
+    wanted = random_joints(nominal, 20, 5)
+    targets = truing.predict(nominal, truing.Measurements(wanted))
+    commands = truing.compensate(nominal, found, wanted, program=True, in_base=True)
+    moved = np.array(commands.solutions.joints)
+    moved[:, 1] += np.where(moved[:, 1] > 0.41, 6e-4, -6e-4)
+    real = truing.predict(nominal, truing.Measurements(moved))
+    assert np.median(np.linalg.norm(real.position - targets.position, axis=1)) < 1e-4
+
+
+@pytest.mark.parametrize("case", ["none", "effects"])
+def test_without_anything_unknown_there_are_no_tables(case: str) -> None:
+    result = diagnosed(measured(case))
+    assert result["after_robot_with_unknown"] is None and not Path("found/robot_with_unknown.yaml").exists()
 
 
 def test_what_nothing_describes_is_unknown_without_joint_and_input(

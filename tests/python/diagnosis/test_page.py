@@ -138,6 +138,7 @@ def some_result(verdict: str, **changes: Any) -> dict[str, Any]:
         },
         "after": {**statistics(rows.magnitude_after), "remaining_structure_p": 0.3},
         "after_unknown": statistics(rows.magnitude_after),
+        "after_robot_with_unknown": None,
         "shrink": {"value": 0.8, "ci": [0.7, 0.9]},
         "effects": effects,
         "unknown": unknowns,

@@ -116,7 +116,7 @@ const std::vector<Effect>& catalogue() {
   static const std::vector<Effect> effects = [] {
     std::vector<Effect> all;
     for (const auto family : {geometry_effects, compliance_effects, transmission_effects, thermal_effects,
-                              coupling_effects, bearing_effects, instrument_effects}) {
+                              coupling_effects, bearing_effects, instrument_effects, table_effects}) {
       for (Effect& effect : family()) all.push_back(std::move(effect));
     }
     return all;

@@ -19,6 +19,7 @@ std::vector<Effect> thermal_effects();
 std::vector<Effect> coupling_effects();
 std::vector<Effect> bearing_effects();
 std::vector<Effect> instrument_effects();
+std::vector<Effect> table_effects();
 
 /// "transmission_error@96" -> its effect; nullptr when the name is of another form.
 const Effect* transmission_error_of(const std::string& name);
