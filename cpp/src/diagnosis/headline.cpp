@@ -14,6 +14,7 @@
 namespace truing::diagnosis {
 
 constexpr std::size_t kCauses = 3;     ///< that a headline has room for
+constexpr std::size_t kRoom = 98;      ///< letters of causes in two lines, of which the gap takes its part
 constexpr std::size_t kQuestions = 5;  ///< that a sentence has room for
 constexpr std::size_t kJoints = 3;     ///< of a cause, that are listed
 constexpr double kContender = 0.25;    ///< of a cause's probability: an alternative that must be reckoned with
@@ -108,12 +109,19 @@ std::string answerable_questions(const Diagnosis& d) {
 /// "link geometry of 6 links, joint compliance at J2 and J3, backlash at J6 and 2 smaller".
 std::string largest_causes(const Diagnosis& d) {
   const std::vector<Cause> causes = causes_of(d);
-  const std::size_t shown = std::min(causes.size(), kCauses);
+  std::vector<std::string> shown;
+  std::size_t letters = 0;
+  for (const Cause& cause : causes) {
+    const std::string words = in_words(cause);
+    letters += words.size();
+    if (!shown.empty() && (shown.size() == kCauses || letters > kRoom)) break;
+    shown.push_back(words);
+  }
   std::size_t smaller = 0;
-  for (std::size_t k = shown; k < causes.size(); ++k) smaller += causes[k].count;
+  for (std::size_t k = shown.size(); k < causes.size(); ++k) smaller += causes[k].count;
   std::string text;
-  for (std::size_t k = 0; k < shown; ++k)
-    text += (k == 0 ? "" : k + 1 == shown && smaller == 0 ? " and " : ", ") + in_words(causes[k]);
+  for (std::size_t k = 0; k < shown.size(); ++k)
+    text += (k == 0 ? "" : k + 1 == shown.size() && smaller == 0 ? " and " : ", ") + shown[k];
   return smaller == 0 ? text : text + " and " + std::to_string(smaller) + " smaller";
 }
 

@@ -120,6 +120,8 @@ TEST_CASE("the headline names the three largest causes, an effect at several joi
   CHECK(largest_causes(d) ==
         "joint compliance at J2 and J3, link geometry of 4 links, transmission error (81 per turn) at J4 and "
         "1 smaller");
+  d.effects[3] = cause("transmission_error@81", {"shoulder_pan", "shoulder_lift", "elbow"}, 0.05);  // no third line
+  CHECK(largest_causes(d) == "joint compliance at J2 and J3, link geometry of 4 links and 2 smaller");
   d.effects.resize(1);
   d.effects[0].confounded_with = {{"harmonic", {"J3"}, 0.1, ""}};
   CHECK(largest_causes(d) == "joint compliance at J2");  // nine to one is no question
