@@ -419,6 +419,9 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
     base = np.linalg.inv(real.T_measurement_base)
     for q, T in zip(joints_of(), wanted, strict=True):
         assert position_off(base @ truing.forward_kinematics(real, q)[-1], T) <= 1.001e-6
+    assert "--in-base" not in capsys.readouterr().err
+    main(["compensate", ROBOT, "real.yaml", "targets.csv", "--out", "elsewhere"])
+    assert "2291 mm and 57.3 deg from that of NOMINAL" in capsys.readouterr().err
 
 
 # ---- Bad input -----------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ target is not reached.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +33,7 @@ from truing.cli.targets import (
     seed_joints,
     target_index,
 )
-from truing.errors import InputError
+from truing.errors import InputError, InputWarning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -112,6 +113,8 @@ class Command(run.Command[Loaded, "Compensations"]):
         believed, real = self._robots()
         index = target_index(believed, self.target)
         data = load_targets(self.targets, believed, like=like, program=True, in_base=self.in_base)
+        if not self.in_base:
+            warn_of_other_base(believed, real)
         start = None if data.is_program else seed_joints(self.seed, believed, data)
         if data.is_program and self.seed:
             raise InputError("--seed: a program of joint positions says itself where the robot comes from")
@@ -201,3 +204,23 @@ class Command(run.Command[Loaded, "Compensations"]):
 
     def failure(self, result: Mapping[str, Any]) -> str:
         return not_whole(result)
+
+
+FAR = 0.05  # [m], and [rad]: no calibration moves a base so far that was known in the measurement frame
+
+
+def warn_of_other_base(believed: Robot, real: Robot) -> None:
+    """Poses are wanted in the measurement frame, of which the controller's robot knows nothing."""
+    import numpy as np
+
+    between = np.linalg.inv(believed.T_measurement_base) @ real.T_measurement_base
+    away = float(np.linalg.norm(between[:3, 3]))
+    turned = float(np.arccos(np.clip((np.trace(between[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
+    if away > FAR or turned > FAR:
+        warnings.warn(
+            f"the base of CALIBRATED is {1e3 * away:.4g} mm and {np.degrees(turned):.3g} deg from that of"
+            " NOMINAL: targets and commands are in the frame of the measurements; --in-base takes them in"
+            " each robot's own base frame, as a controller's program has them",
+            InputWarning,
+            stacklevel=2,
+        )
