@@ -165,15 +165,17 @@ def _fall(result: Mapping[str, Any]) -> str:
         )
         if not same:  # drifts and corrections of laws are no part of a robot
             texts.append(f"{length_text(by_robot)} by robot.yaml alone, {_less(shrink['value'])} ({sure})")
-    free = _free(result)
+    free, by_tables = _free(result), result["after_robot_with_unknown"]
     if free:
+        same = by_tables and abs(by_tables["rms_m"] - by_all) <= 0.03 * by_all
         texts.append(
             f'{"" if texts else "→ "}<span class="after">{length_text(by_all)}</span> with'
             f" {'a free function' if len(free) == 1 else 'free functions'} "
             f"for what is unknown{'' if texts else ', not by anything known'}"
+            + (" (robot_with_unknown.yaml)" if same else "")
         )
-    if tables := result["after_robot_with_unknown"]:
-        texts.append(f"{length_text(tables['rms_m'])} by robot_with_unknown.yaml, which has these as tables")
+        if by_tables and not same:  # functions of time or order are no part of a robot
+            texts.append(f"{length_text(by_tables['rms_m'])} by robot_with_unknown.yaml")
     return "; ".join(texts)
 
 

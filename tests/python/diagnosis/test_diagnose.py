@@ -337,6 +337,8 @@ def test_the_real_robot_reaches_its_targets_where_commands_go_by_the_tables() ->
 
 @pytest.mark.parametrize("case", ["none", "effects"])
 def test_without_anything_unknown_there_are_no_tables(case: str) -> None:
+    Path("found").mkdir()
+    Path("found/robot_with_unknown.yaml").write_text("of an earlier run")
     result = diagnosed(measured(case))
     assert result["after_robot_with_unknown"] is None and not Path("found/robot_with_unknown.yaml").exists()
 

@@ -41,7 +41,7 @@ PANEL = "Diagnose"
 @dataclass(frozen=True, kw_only=True)
 class Command(run.Command["tuple[Robot, Measurements]", "Diagnosis"]):
     doing = "diagnosing"
-    sometimes = ("next_poses.csv",)
+    sometimes = ("next_poses.csv", "robot_with_unknown.yaml", "robot_with_unknown.urdf")
 
     robot: RobotFile
     data: DataFile
