@@ -181,6 +181,7 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
   for (std::size_t j = 0; j < columns->size(); ++j) {
     const auto joint = static_cast<Index>(j);
     MatrixXd& table = (*columns)[j];
+    if (table.rows() == 0) continue;
     table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
     const std::vector<std::vector<Index>> rows = fitted_rows(tile, joint, folds);
     for (std::size_t f = 0; f < rows.size(); ++f) {
@@ -192,8 +193,8 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
 
 }  // namespace
 
-DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
-    : DesignColumns(tiles, design, all_columns(design)) {
+DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, Resting resting)
+    : DesignColumns(tiles, design, all_columns(design), resting) {
   constexpr double kMostKept = 400.0 * 1024 * 1024;  ///< [bytes]
   double numbers = 0.0;
   for (const std::vector<int>& mine : by_joint_) numbers += static_cast<double>(mine.size() + 1);
@@ -202,9 +203,10 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design)
   stale_.resize(kept_.size(), 0);
 }
 
-DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns)
+DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns, Resting resting)
     : tiles_(tiles),
       design_(design),
+      resting_(resting),
       chain_(tiles.robot()),
       columns_(std::move(columns)),
       by_joint_(columns_by_joint(design, columns_, tiles.robot().driven_count())) {
@@ -222,10 +224,14 @@ const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<Mat
 }
 
 void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const {
+  const auto is_made = [&](const TorqueTerm& term) {
+    return wanted(term) &&
+           std::any_of(term.joints.begin(), term.joints.end(), [&](std::size_t j) { return (*tables)[j].rows() > 0; });
+  };
   const auto any = [&](bool TorqueTerm::* needs) {
     return std::any_of(columns_.begin(), columns_.end(), [&](int c) {
       const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
-      return term.link_parameter < 0 && term.*needs && wanted(term);
+      return term.link_parameter < 0 && term.*needs && is_made(term);
     });
   };
   if (any(&TorqueTerm::needs_rigid)) fill_rigid(&tile->motion);
@@ -238,20 +244,20 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)
   std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place
   for (const int c : columns_) {
     const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
-    const bool of_link = term.link_parameter >= 0, now = wanted(term);
+    const bool of_link = term.link_parameter >= 0, now = is_made(term);
     const auto same = term.column.empty() ? made_already.end() : made_already.find(term.column);
     const bool copied = same != made_already.end();
     const MatrixXd values = of_link || copied || !now ? MatrixXd() : term.basis(tile->motion);
     for (std::size_t k = 0; k < term.joints.size(); ++k) {
       const std::size_t j = term.joints[k];
       const Index place = next[j]++;
+      if (!now || (*tables)[j].rows() == 0) continue;
       auto out = (*tables)[j].col(place);
-      if (!now) continue;
       if (copied) {
         out = (*tables)[same->second.first].col(same->second.second);
         continue;
       }
-      if (k == 0 && !term.column.empty()) made_already.try_emplace(term.column, j, place);
+      if (!term.column.empty()) made_already.try_emplace(term.column, j, place);
       if (of_link)
         out = links_of(tile, &made)[j].col(place_of(chain_, j, term.link_parameter));
       else if (values.rows() == 0)
@@ -267,8 +273,10 @@ void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(T
   Tables made;
   Tables& tables = kept_.empty() ? made : kept_[tile->number];
   if (tables.empty()) {
-    for (const std::vector<int>& columns : by_joint_)
-      tables.emplace_back(tile->count, static_cast<Index>(columns.size()) + 1);
+    for (std::size_t j = 0; j < by_joint_.size(); ++j) {
+      const bool wanted = resting_ == Resting::made || tile->moving.col(static_cast<Index>(j)).any();
+      tables.emplace_back(wanted ? tile->count : 0, static_cast<Index>(by_joint_[j].size()) + 1);
+    }
     fill(tile, [](const TorqueTerm& term) { return !term.needs_torque; }, &tables);
   } else if (stale_[tile->number] != 0) {
     fill(tile, looks_at_direction, &tables);
@@ -367,6 +375,7 @@ class ErrorsOf {
     MatrixXd errors = tile->measured - kept_torque(model_, tile);
     columns_.use(tile, false, [&](const DesignColumns::Tables& tables) {
       for (std::size_t j = 0; j < tables.size(); ++j) {
+        if (tables[j].rows() == 0) continue;
         const std::vector<int>& of = columns_.of_joint(j);
         for (std::size_t c = 0; c < of.size(); ++c) {
           if (values_[of[c]] != 0.0)

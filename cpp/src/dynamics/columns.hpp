@@ -12,16 +12,21 @@
 
 namespace truing::dynamics {
 
+/// Rows at rest are not fitted: who asks for no others needs no columns of a joint that rests all through a tile.
+enum class Resting { made, left_out };
+
 /// Tables of columns, tile by tile. Where tiles are kept, so are columns that need no torque.
 class DesignColumns {
  public:
-  /// By joint, shape=(count, columns of the joint + 1): filtered columns, and room for the torque.
+  /// By joint, shape=(count, columns of the joint + 1): filtered columns, and room for the torque. Without rows where
+  /// the joint rests and is left out.
   using Tables = std::vector<Eigen::MatrixXd>;
 
   /// Both must outlive it.
-  DesignColumns(const Tiles& tiles, const TorqueDesign& design);
+  DesignColumns(const Tiles& tiles, const TorqueDesign& design, Resting resting = Resting::made);
   /// Of some columns of the design alone, ascending numbers; they are not kept.
-  DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns);
+  DesignColumns(const Tiles& tiles, const TorqueDesign& design, std::vector<int> columns,
+                Resting resting = Resting::made);
 
   const Tiles& tiles() const { return tiles_; }
   const TorqueDesign& design() const { return design_; }
@@ -44,6 +49,7 @@ class DesignColumns {
 
   const Tiles& tiles_;
   const TorqueDesign& design_;
+  Resting resting_;
   RigidChain chain_;
   std::vector<int> columns_;  ///< ascending
   std::vector<std::vector<int>> by_joint_;
@@ -53,7 +59,8 @@ class DesignColumns {
 };
 
 /// What a fit of all columns leaves of the torque that `subtracted` leaves, in rows that these folds have, those at
-/// rest included: rms by joint [Nm | N]. Columns that need a torque were last summed with that of `seen`.
+/// rest included, so none is left out: rms by joint [Nm | N]. Columns that need a torque were last summed with that of
+/// `seen`.
 std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
                            const Eigen::VectorXd& values, const Folds& folds);
 

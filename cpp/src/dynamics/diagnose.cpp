@@ -73,7 +73,7 @@ std::vector<FoldGram> held_out_of(const Problem& problem, const Account& account
     columns.insert(columns.end(), more.begin(), more.end());
   }
   std::sort(columns.begin(), columns.end());
-  const DesignColumns chosen(problem.tiles, *account.design, std::move(columns));
+  const DesignColumns chosen(problem.tiles, *account.design, std::move(columns), Resting::left_out);
   const TorqueGrams grams = sum_grams(chosen, problem.nominal, seen, problem.test);
   std::vector<FoldGram> out;
   for (int f = 0; f < problem.test.count; ++f) out.emplace_back(grams, static_cast<std::size_t>(f), noise);
@@ -270,7 +270,7 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   }
   const auto [choice, small] = likely_and_small(of_effects, fitted);
   add_free_functions(problem.robot, problem.range, design.get());
-  const DesignColumns columns(problem.tiles, *design);
+  const DesignColumns columns(problem.tiles, *design, Resting::left_out);
   const TorqueGrams grams = sum_grams(columns, problem.nominal, model, problem.train);
   *noise = noise_of_all(problem, columns, grams, *noise);
   std::vector<bool> priors = inertial_columns(*design);
@@ -308,7 +308,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   limits.least_gain = options.least_gain;
   limits.most = options.max_effects;
   limits.plausible_only = !problem.fitted_before;  // departures from what the robot carries have either sign
-  auto columns = std::make_unique<DesignColumns>(problem.tiles, *design);
+  auto columns = std::make_unique<DesignColumns>(problem.tiles, *design, Resting::left_out);
   TorqueModel model = groundwork.model;
   TorqueGrams grams = sum_grams(*columns, problem.nominal, model, problem.train);
   std::vector<Noise> noise = noise_of_all(problem, *columns, grams, groundwork.noise);

@@ -131,7 +131,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   const Groundwork groundwork = groundwork_of(&problem);
   const TorqueDesign design = requested_design(problem, options);
   const std::vector<bool> with_prior = inertial_columns(design);
-  const DesignColumns columns(problem.tiles, design);
+  const DesignColumns columns(problem.tiles, design, Resting::left_out);
 
   TorqueFit out;
   TorqueModel model = groundwork.model;

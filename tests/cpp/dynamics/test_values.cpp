@@ -135,3 +135,24 @@ TEST_CASE("sums of some columns are those that all columns have, to the bit") {
   CHECK(a.xy == b.xy);
   CHECK(a.xx.trace() > 0.0);
 }
+
+TEST_CASE("columns of a joint that rests all through a tile may be left out: sums stay, to the bit") {
+  std::vector<Recording> recordings = recorded();
+  recordings[1].position.col(1).setConstant(0.3);
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign design = whole(problem);
+  const TorqueModel more = with_more(problem.nominal, design);
+  DesignColumns made(problem.tiles, design), left_out(problem.tiles, design, Resting::left_out);
+  check_same(sum_grams(left_out, problem.nominal, more, problem.train),
+             sum_grams(made, problem.nominal, more, problem.train));
+  Eigen::Index rows_made = 0, rows_left = 0;
+  problem.tiles.for_each([](std::size_t r) { return r == 1; },
+                         [&](Tile& tile, std::size_t) {
+                           made.use(&tile, false, [&](DesignColumns::Tables& tables) { rows_made = tables[1].rows(); });
+                           left_out.use(&tile, false,
+                                        [&](DesignColumns::Tables& tables) { rows_left = tables[1].rows(); });
+                         },
+                         [](std::size_t) {});
+  CHECK(rows_made > 0);
+  CHECK(rows_left == 0);
+}
