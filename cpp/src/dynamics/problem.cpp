@@ -536,7 +536,7 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
   ModelMoments out;
   const VectorXd time = tile->own_time();
   for (const auto& [name, model] : models) {
-    const MatrixXd predicted = own_torque(model, tile);
+    const MatrixXd& predicted = kept_torque(model, tile);
     std::vector<Moments> by_joint(static_cast<std::size_t>(predicted.cols()));
     for (Index i = 0; i < tile->count; ++i) {
       if (folds.fold(tile->recording, time[i]) < 0) continue;

@@ -235,10 +235,21 @@ Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::Matri
   return out;
 }
 
+namespace {
+
+/// Of every reading, shape=(rows, readings), to be filled. Copies of one would copy what is not there yet.
+std::vector<Eigen::MatrixXd> empty_tables(Eigen::Index rows, Eigen::Index readings) {
+  std::vector<Eigen::MatrixXd> out;
+  for (Eigen::Index k = 0; k < readings; ++k) out.emplace_back(rows, readings);
+  return out;
+}
+
+}  // namespace
+
 std::vector<Eigen::MatrixXd> RigidChain::mass_matrices(const Eigen::MatrixXd& q,
                                                        const Eigen::VectorXd& parameters) const {
   const Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(q.rows(), q.cols());
-  std::vector<Eigen::MatrixXd> out(static_cast<std::size_t>(driven()), Eigen::MatrixXd(q.rows(), driven()));
+  std::vector<Eigen::MatrixXd> out = empty_tables(q.rows(), driven());
   thread_local std::vector<double> part;
   passes(q, rest, rest, 0, q.rows(),
          [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
@@ -259,8 +270,7 @@ RigidChain::Changes RigidChain::torque_changes(const Eigen::MatrixXd& q, const E
                                                const Eigen::MatrixXd& qdd, const Eigen::VectorXd& parameters,
                                                const Eigen::MatrixXd& dq, const Eigen::MatrixXd& dqd,
                                                const Eigen::MatrixXd& dqdd) const {
-  const std::vector<Eigen::MatrixXd> room(static_cast<std::size_t>(driven()), Eigen::MatrixXd(q.rows(), driven()));
-  Changes out{room, room};
+  Changes out{empty_tables(q.rows(), driven()), empty_tables(q.rows(), driven())};
   thread_local std::vector<double> part, change;
   passes(q, qd, qdd, 0, q.rows(),
          [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
