@@ -16,7 +16,7 @@ import pytest
 import yaml
 
 from truing.dynamics import Recording, identify
-from truing.dynamics.export import Exported, export
+from truing.dynamics.export import Exported, export, refit
 from truing.dynamics.export.refit import lacking, training
 from truing.dynamics.runner import runnable
 from truing.dynamics.simulate import judge
@@ -176,3 +176,21 @@ def test_forms_of_laws_can_be_left_out(simulated: SimulatedMotion, trained: list
     fit = identify(simulated.nominal, trained, effects="coulomb,viscous_law", leave_out_forms=forms)
     (laws,) = [e for e in fit.robot.torque_effects if e.effect == "viscous_law" and "J2" in e.joints]
     assert list(laws.parameters) == ["viscous_law.J2.quadratic"]
+
+
+def test_only_the_joint_whose_law_cannot_be_written_goes_without_one(
+    simulated: SimulatedMotion, trained: list[Recording], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit, bare = refit.fit_without, []
+
+    def with_a_curve_that_rises(*given: Any) -> Any:
+        bare.append(set(given[-1]))
+        robot = fit(*given)
+        if "J4" in bare[-1]:
+            return robot
+        curve = AppliedEffect("stribeck", ["J4"], {"stribeck.J4": -1.0, "stribeck.J4.vs": 0.02})
+        return robot.replace(torque_effects=[*robot.torque_effects, curve])
+
+    monkeypatch.setattr(refit, "fit_without", with_a_curve_that_rises)
+    export(simulated.truth, "mjcf", tmp_path, recordings=trained)
+    assert bare == [set(), {"J4"}]

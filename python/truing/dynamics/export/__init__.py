@@ -215,14 +215,16 @@ def _anew(
     recordings: Sequence[Recorded],
     cutoff: float | None,
 ) -> _Written:
-    """Fitted anew without these parameters, with laws of friction that stand in their place where the format
-    can hold those."""
-    for instead in (True, False):
-        robot = refit.fit_without(whole.robot, parameters, to, recordings, cutoff, instead)
+    """Fitted anew without these parameters, with laws of friction that stand in their place at joints where
+    the format can hold those."""
+    bare: set[str] = set()
+    while True:
+        robot = refit.fit_without(whole.robot, parameters, to, recordings, cutoff, bare)
         anew = _written(robot, to, source, recordings, alone=bool(whole.callbacks))
-        if not refit.lacking(robot, anew.left):
-            break
-    return anew
+        more = refit.joints_with(robot, refit.lacking(robot, anew.left)) - bare
+        if not more:
+            return anew
+        bare |= more
 
 
 def _source_text(path: Path) -> str:

@@ -46,6 +46,12 @@ def lacking(robot: _core.Robot, left: Iterable[NotWritten]) -> list[str]:
     ]
 
 
+def joints_with(robot: _core.Robot, parameters: Collection[str]) -> set[str]:
+    """Joints of the effects that have one of these parameters."""
+    found = [effect for effect in robot.torque_effects if set(effect.parameters) & set(parameters)]
+    return {joint for effect in found for joint in effect.joints}
+
+
 def training(
     recordings: Sequence[tuple[_core.Recording, NDArray[np.bool_]]],
 ) -> list[_core.Recording]:
@@ -86,11 +92,11 @@ def fit_without(
     to: str,
     recordings: Sequence[Recorded],
     cutoff: float | None,
-    instead: bool = True,
+    bare_joints: Collection[str] = (),
 ) -> _core.Robot:
     """The robot without these parameters: friction, bodies and rotor inertias fitted anew to all of the
-    recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one. instead: with laws of
-    friction that the format `to` holds, at joints that lose one.
+    recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one. Joints that lose a law of
+    friction get one that the format `to` holds, but for bare_joints.
 
     Raises InputError on recordings that nothing can be fitted to.
     """
@@ -109,7 +115,8 @@ def fit_without(
         if effect.effect in _OF_MOTION and set(effect.parameters) & set(parameters)
         for joint in effect.joints
     }
-    if instead and to == "mjcf":
+    lost -= set(bare_joints)
+    if to == "mjcf":
         where["viscous_law"] |= lost
         # MuJoCo has it as a part of what builds up over an angle after a reversal.
         where["stribeck"] |= lost & where["presliding"]
