@@ -143,7 +143,7 @@ int main(int argc, char** argv) {
   const std::string folder = argv[1];
   const Given given = read_given(folder);
   Problem problem(given.robot, given.recordings, {given.cutoff, given.test_share});
-  const Groundwork groundwork = groundwork_of(&problem);
+  const Groundwork groundwork = groundwork_of(&problem, true);
   const TorqueDesign design = design_of(problem.robot, problem.range, {}, {}, true);
   write_rows(folder, problem, design, groundwork.model);
   print_columns(design);

@@ -284,7 +284,7 @@ void set_direction(const std::vector<FrictionTurn>& turns, Tile* tile) {
   motion.direction.resize(motion.q.rows(), motion.q.cols());
   for (Index j = 0; j < motion.q.cols(); ++j) {
     const FrictionTurn& turn = turns[static_cast<std::size_t>(j)];
-    const auto [at, fresh] = tile->memory.directions.try_emplace({j, turn.speed, turn.travel});
+    const auto [at, fresh] = tile->memory.directions.try_emplace({j, turn.speed, turn.travel, turn.fade});
     if (fresh) at->second = direction_of(motion, j, turn);
     motion.direction.col(j) = at->second;
   }

@@ -139,7 +139,7 @@ class Refit {
 
 bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
-    return one.speed == other.speed && one.travel == other.travel;
+    return one.speed == other.speed && one.travel == other.travel && one.fade == other.fade;
   });
 }
 
@@ -298,7 +298,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   validate(robot);
   require_usable(robot, recordings);
   Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
-  const Groundwork groundwork = groundwork_of(&problem);
+  const Groundwork groundwork = groundwork_of(&problem, true);
   auto design = std::make_shared<TorqueDesign>(whole_design(problem, options));
   const std::vector<int> nuisance = problem.fitted_before ? std::vector<int>{} : standard_columns(*design);
   std::vector<bool> priors = inertial_columns(*design);
@@ -322,7 +322,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     if (round + 1 == kRounds && !problem.fitted_before) {
       const std::vector<FrictionTurn> before = problem.range.turns;
       Refit refit(problem, *design, choice, model, noise);
-      choose_turns(&problem, [&] { return refit.errors(); });
+      choose_turns(&problem, true, [&] { return refit.errors(); });
       turned = !same(problem.range.turns, before);
       if (turned) {
         *design = whole_design(problem, options);  // of the same groups

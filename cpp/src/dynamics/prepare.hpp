@@ -23,8 +23,8 @@ constexpr double kSpeedAtRest = 0.01;
 
 /// What was made of a tile and may be asked for again: it depends on nothing but what it is kept under.
 struct TileMemory {
-  /// By joint, speed and travel of a turn: directions at every row of the motion.
-  std::map<std::tuple<Eigen::Index, double, double>, Eigen::VectorXd> directions;
+  /// By joint, speed, travel and fading of a turn: directions at every row of the motion.
+  std::map<std::tuple<Eigen::Index, double, double, double>, Eigen::VectorXd> directions;
   /// Filtered columns of the inertial parameters, in the tile's own rows: by joint, those of the links that it feels.
   std::vector<Eigen::MatrixXd> links;
   std::uint64_t model = 0;  ///< TorqueModel::number() of `torque`

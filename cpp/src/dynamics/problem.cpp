@@ -586,8 +586,10 @@ std::vector<TorqueErrors> errors_of(const Problem& problem,
 
 // --- the turn of friction ------------------------------------------------------------------------
 
-void choose_turns(Problem* problem, const std::function<std::vector<double>()>& errors_with) {
-  constexpr FrictionTurn kTurns[] = {{0.01, 0.0}, {1e-3, 0.0}, {3e-4, 0.0}, {0.01, 1e-6}, {0.01, 1e-5}, {0.01, 1e-4}};
+void choose_turns(Problem* problem, bool may_fade, const std::function<std::vector<double>()>& errors_with) {
+  constexpr FrictionTurn kTurns[] = {{0.01, 0.0},  {1e-3, 0.0},  {3e-4, 0.0},       {0.01, 1e-6},
+                                     {0.01, 1e-5}, {0.01, 1e-4}, {0.01, 1e-4, 1.0}, {0.01, 1e-4, 10.0}};
+  const double least_of_fading = std::sqrt(0.99);  // a law more removes 1 % of a joint's squares, as effects must
   const auto set = [&](const std::vector<FrictionTurn>& turns) {
     problem->range.turns = turns;
     problem->nominal = problem->nominal.turning(turns);
@@ -596,10 +598,13 @@ void choose_turns(Problem* problem, const std::function<std::vector<double>()>& 
   std::vector<double> least(joints, std::numeric_limits<double>::infinity());
   std::vector<FrictionTurn> chosen(joints);
   for (const FrictionTurn& turn : kTurns) {
+    // Blocks of one recording share its rests: a joint that rests once does not say what friction forgets.
+    if (turn.fade > 0.0 && (problem->single || !may_fade)) continue;
     set(std::vector<FrictionTurn>(joints, turn));
     const std::vector<double> errors = errors_with();
     for (std::size_t j = 0; j < joints; ++j) {
-      if (errors[j] >= least[j]) continue;
+      const bool one_more = turn.fade > 0.0 && chosen[j].fade == 0.0;
+      if (errors[j] >= least[j] * (one_more ? least_of_fading : 1.0)) continue;
       least[j] = errors[j];
       chosen[j] = turn;
     }
@@ -607,7 +612,7 @@ void choose_turns(Problem* problem, const std::function<std::vector<double>()>& 
   set(chosen);
 }
 
-Groundwork groundwork_of(Problem* problem) {
+Groundwork groundwork_of(Problem* problem, bool may_fade) {
   if (problem->fitted_before) {
     const std::vector<Noise> noise = noise_of(problem->tiles, problem->nominal, problem->train);
     return {standard_design(*problem), {}, {}, problem->nominal, noise};
@@ -621,7 +626,7 @@ Groundwork groundwork_of(Problem* problem) {
     grams = sum_grams(table, problem->nominal, problem->nominal, problem->train, {grams, true});
     return standard_fit(*problem, design, table, grams);
   };
-  choose_turns(problem, [&] {
+  choose_turns(problem, may_fade, [&] {
     const StandardFit now = fitted();
     return rms_of(table, problem->nominal, problem->nominal, by_column(design, now.fit), problem->train);
   });

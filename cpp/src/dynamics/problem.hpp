@@ -93,14 +93,15 @@ struct Groundwork {
   TorqueModel model;
   std::vector<Noise> noise;
 };
-/// How friction turns is chosen first (choose_turns).
-Groundwork groundwork_of(Problem* problem);
+/// How friction turns is chosen first (choose_turns), and, if it `may_fade`, how long it lasts at rest: that is a law
+/// more, which nobody asks for who asks for Coulomb friction.
+Groundwork groundwork_of(Problem* problem, bool may_fade = false);
 
 /// Sets MotionRange::turns, and those of the nominal model, to what leaves the smallest errors at every joint on the
 /// training rows, those at rest included: how friction is left at rest is part of how it turns. Friction that a model
 /// turns more slowly than the joint does, or forgets at rest, would look like presliding and like Stribeck's curve.
 /// `errors_with`: rms errors by joint on these rows of what is fitted with the turns that are set [Nm | N].
-void choose_turns(Problem* problem, const std::function<std::vector<double>()>& errors_with);
+void choose_turns(Problem* problem, bool may_fade, const std::function<std::vector<double>()>& errors_with);
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
               const MotionRange& range);

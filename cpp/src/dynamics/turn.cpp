@@ -46,10 +46,12 @@ VectorXd direction_by_speed(const Eigen::Ref<const VectorXd>& qd, double width) 
 }
 
 // Over half a row z runs on to its bound, and stays there for the rest.
-VectorXd stop_operator(const Eigen::Ref<const VectorXd>& q, double x0) {
+VectorXd stop_operator(const Eigen::Ref<const VectorXd>& q, double x0, double kept) {
   VectorXd out = VectorXd::Zero(q.size());
   double z = 0.0;
+  const double kept_of_half = std::sqrt(kept);
   const auto half_row = [&](double move) {  // its mean
+    z *= kept_of_half;
     const double bound = std::copysign(1.0, move), way = std::abs(move), room = std::abs(bound - z);
     const double begin = z;
     if (way <= room) {
@@ -75,8 +77,9 @@ VectorXd stop_operator(const Eigen::Ref<const VectorXd>& q, double x0) {
 }
 
 VectorXd direction_of(const Motion& motion, Index joint, const FrictionTurn& turn) {
-  return turn.travel > 0.0 ? stop_operator(motion.q.col(joint), turn.travel)
-                           : direction_by_speed(motion.qd.col(joint), turn.speed);
+  if (turn.travel == 0.0) return direction_by_speed(motion.qd.col(joint), turn.speed);
+  const double kept = turn.fade > 0.0 ? std::exp(-motion.step / turn.fade) : 1.0;
+  return stop_operator(motion.q.col(joint), turn.travel, kept);
 }
 
 MatrixXd directions_of(const Motion& motion, const std::vector<FrictionTurn>& turns) {

@@ -12,8 +12,9 @@
 namespace truing::dynamics {
 
 /// Prandtl's stop operator (1928): z follows the travel / x0 and stays between -1 and 1. Each row has the mean over the
-/// time that belongs to it, positions on straight lines between the rows.
-Eigen::VectorXd stop_operator(const Eigen::Ref<const Eigen::VectorXd>& q, double x0);
+/// time that belongs to it, positions on straight lines between the rows. `kept`: part of z that is left after a row's
+/// time without travel.
+Eigen::VectorXd stop_operator(const Eigen::Ref<const Eigen::VectorXd>& q, double x0, double kept = 1.0);
 
 /// tanh(speed / width), each row the mean over the time that belongs to it, speeds on straight lines between the rows.
 Eigen::VectorXd direction_by_speed(const Eigen::Ref<const Eigen::VectorXd>& qd, double width);

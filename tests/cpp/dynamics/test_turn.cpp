@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -39,7 +42,69 @@ std::vector<Recording> recorded_dry(const Robot& robot) {
   return out;
 }
 
+/// Goes to and fro, and stands still for some seconds after each way, friction of `robot` on it.
+std::vector<Recording> recorded_rests(const Robot& robot, int recordings, double seconds) {
+  std::vector<Recording> out;
+  for (int k = 0; k < recordings; ++k) {
+    Recording one;
+    one.name = "motion" + std::to_string(k);
+    const auto rows = static_cast<Eigen::Index>(100.0 * seconds);
+    one.time = Eigen::VectorXd::LinSpaced(rows, 0.0, 0.01 * static_cast<double>(rows - 1));
+    one.position.resize(rows, 1);
+    Random random(static_cast<std::uint64_t>(40 + k));
+    double from = 0.3 * k, to = -0.4, begin = 0.0, way = 2.0, rest = 2.0;
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      if (one.time[i] > begin + way + rest) {
+        from = to;
+        to = random.uniform(-0.6, 0.6);
+        begin = one.time[i];
+        way = random.uniform(1.0, 3.0);
+        rest = random.uniform(1.0, 4.0);
+      }
+      const double s = std::min(1.0, (one.time[i] - begin) / way);
+      one.position(i, 0) = from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    }
+    one.torque = dynamics::predict(robot, one, 40.0).torque;
+    for (Eigen::Index i = 0; i < rows; ++i) one.torque(i, 0) += 0.1 * random.normal();
+    one.test = recordings > 1 && k + 2 >= recordings;
+    out.push_back(one);
+  }
+  return out;
+}
+
+/// `fade`: [s]; 0: friction at rest stays.
+Robot with_fading_friction(double fade) {
+  Robot robot = swung::level_arm(1);
+  std::map<std::string, double> parameters{{"coulomb.J1", 4.0}, {"coulomb.J1.turn_travel", 1e-4}};
+  if (fade > 0.0) parameters["coulomb.J1.turn_fade"] = fade;
+  robot.torque_effects = {{"coulomb", {"J1"}, parameters}, {"viscous", {"J1"}, {{"viscous.J1", 1.0}}}};
+  return robot;
+}
+
 }  // namespace
+
+TEST_CASE("what the stop operator remembers fades where nothing moves") {
+  Eigen::VectorXd q = Eigen::VectorXd::Constant(12, 1.0);
+  q[0] = 0.0;
+  const Eigen::VectorXd z = dynamics::stop_operator(q, 0.1, 0.8);
+  for (Eigen::Index i = 3; i < 11; ++i) CHECK(std::abs(z[i] / z[i - 1] - 0.8) < 1e-12);
+  CHECK(z[2] > 0.7);
+}
+
+TEST_CASE("friction that fades at rest is found where recordings show it") {
+  for (const double fade : {0.0, 1.0, 10.0}) {
+    const std::vector<Recording> rests = recorded_rests(with_fading_friction(fade), 6, kSanitized ? 15.0 : 30.0);
+    const TorqueDiagnosis d = dynamics::diagnose(swung::level_arm(1), rests);
+    CHECK(dynamics::turns_of(d.robot).front().fade == fade);
+    CHECK(d.errors[2].held_out.front().rms < 0.15);
+  }
+}
+
+TEST_CASE("a single recording does not say that friction fades") {
+  const std::vector<Recording> rests = recorded_rests(with_fading_friction(1.0), 1, 60.0);
+  const TorqueDiagnosis d = dynamics::diagnose(swung::level_arm(1), rests);
+  CHECK(dynamics::turns_of(d.robot).front().fade == 0.0);
+}
 
 TEST_CASE("the stop operator's rows are means over their time") {
   // Up by 1, down by 1 in rows of 0.5: z is -1 … 1 over a travel of 0.2.

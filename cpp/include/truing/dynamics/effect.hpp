@@ -105,10 +105,12 @@ struct TorqueTraits {
 using TorqueForm = std::vector<TorqueTerm>;
 
 /// How dry friction turns round with the motion: by the speed, tanh(qd / speed), or by the travel, as Prandtl's stop
-/// operator (1928), which remembers at rest where it came from.
+/// operator (1928), which remembers at rest where it came from; for ever, or as a Maxwell body (1867) does, whose
+/// stress fades.
 struct FrictionTurn {
   double speed = 0.01;  ///< [rad/s | m/s]
   double travel = 0.0;  ///< [rad | m]; 0: by the speed
+  double fade = 0.0;    ///< [s] in which what is remembered falls to 1 / e; 0: it does not
 };
 
 /// What the recordings hold, and how far they reach.

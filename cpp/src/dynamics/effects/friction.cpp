@@ -25,6 +25,7 @@ ArrayXd direction(const Motion& motion, std::size_t joint) { return motion.direc
 const char* const kCoulomb = "coulomb";
 const char* const kTurnSpeed = "turn_speed";
 const char* const kTurnTravel = "turn_travel";
+const char* const kTurnFade = "turn_fade";
 
 /// The direction is that of the motion, which knows how friction turns; the term's constants say it.
 TorqueForm coulomb_turning(const Robot& robot, std::size_t joint, const FrictionTurn& turn, double prior) {
@@ -33,6 +34,7 @@ TorqueForm coulomb_turning(const Robot& robot, std::size_t joint, const Friction
   const bool by_travel = turn.travel > 0.0;
   term.constants[parameter_name(kCoulomb, robot, joint, by_travel ? kTurnTravel : kTurnSpeed)] =
       by_travel ? turn.travel : turn.speed;
+  if (by_travel && turn.fade > 0.0) term.constants[parameter_name(kCoulomb, robot, joint, kTurnFade)] = turn.fade;
   return {term};
 }
 
@@ -190,9 +192,11 @@ std::vector<FrictionTurn> turns_of(const Robot& robot) {
   for (std::size_t joint = 0; joint < out.size(); ++joint) {
     const std::string speed = parameter_name(kCoulomb, robot, joint, kTurnSpeed);
     const std::string travel = parameter_name(kCoulomb, robot, joint, kTurnTravel);
+    const std::string fade = parameter_name(kCoulomb, robot, joint, kTurnFade);
     for (const AppliedEffect& effect : robot.torque_effects) {
       if (effect.parameters.count(speed) > 0) out[joint].speed = constant_of(effect.parameters, speed);
       if (effect.parameters.count(travel) > 0) out[joint].travel = constant_of(effect.parameters, travel);
+      if (effect.parameters.count(fade) > 0) out[joint].fade = constant_of(effect.parameters, fade);
     }
   }
   return out;
@@ -205,8 +209,9 @@ std::vector<TorqueEffect> friction_effects() {
       {"coulomb", "friction of one size, against the motion", coulomb, true,
        traits("dry friction", Place::field, Place::field,
               {"s = tanh(qd / turn_speed), or s <- clip(s + dq / turn_travel, -1, 1), which remembers at rest "
-               "where it came from",
-               "`coulomb.J2` [Nm] with `.turn_speed` [rad/s] or `.turn_travel` [rad]", "motion both ways"}),
+               "where it came from, for ever or fading by s / turn_fade a second",
+               "`coulomb.J2` [Nm] with `.turn_speed` [rad/s] or `.turn_travel` [rad], `.turn_fade` [s]",
+               "motion both ways"}),
        coulomb_with});
   out.push_back({"viscous", "friction that grows with the speed", viscous, true,
                  traits("viscous friction", Place::field, Place::field, {"qd", "`viscous.J2` [Nm s/rad]", "speed"})});

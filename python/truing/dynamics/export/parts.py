@@ -49,7 +49,7 @@ _PER_JOINT = (
     "warmup",
 )
 _PARTS = {
-    "coulomb": ("", "turn_speed", "turn_travel"),
+    "coulomb": ("", "turn_speed", "turn_travel", "turn_fade"),
     "viscous_law": ("quadratic", "cubic", "root", "saturating", "v0"),
     "stribeck": ("", "vs"),
     "presliding": ("", "x0"),
