@@ -227,11 +227,20 @@ class Designer {
     return size;
   }
 
+  const EffectTraits& traits_of_owner(const ParameterInfo& info) const {
+    return traits_of(model_.requests[static_cast<std::size_t>(info.owner)].effect, task_.options.own_effects);
+  }
+
   /// How far the effect that a parameter belongs to may well move its site.
   double largest_motion(const ParameterInfo& info) const {
-    if (info.role != Role::effect) return kLargest;
-    const std::string& effect = model_.requests[static_cast<std::size_t>(info.owner)].effect;
-    return traits_of(effect, task_.options.own_effects).prior;
+    return info.role == Role::effect ? traits_of_owner(info).prior : kLargest;
+  }
+
+  /// Moments of weights that nobody knows: what hardly loads the joint, as what a parallelogram holds upright, is no
+  /// heavier for it than machines are.
+  double no_more_than_plausible(const ParameterInfo& info, double prior) const {
+    if (info.role != Role::effect || traits_of_owner(info).search != Search::with_unknown_weights) return prior;
+    return std::min(prior, traits_of_owner(info).plausible);
   }
 
   /// Names, units and the sizes that parameters may have.
@@ -243,7 +252,7 @@ class Designer {
       out_.column_names.push_back(info.name);
       out_.column_units.push_back(info.unit);
       const double size = size_of_basis(info, under_full_weight);
-      if (size > 0.0) out_.prior[k] = largest_motion(info) / size;
+      if (size > 0.0) out_.prior[k] = no_more_than_plausible(info, largest_motion(info) / size);
       const auto shift = task_.shift.find(info.name);
       if (shift != task_.shift.end()) out_.y += shift->second * out_.x.col(k);
     }

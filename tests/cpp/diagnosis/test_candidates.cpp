@@ -6,7 +6,11 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <numeric>
+#include <optional>
 
+#include "diagnosis/design.hpp"
+#include "diagnosis/inputs.hpp"
 #include "support/arms.hpp"
 
 namespace {
@@ -143,3 +147,28 @@ TEST_CASE("an own effect is found at its joint and drawn over the input that dri
 }
 
 }  // namespace
+
+TEST_CASE("a weight that hardly loads a joint is not thought larger for it than machines are") {
+  Robot nominal = arms::palletizer();  // joint 4 holds what it carries upright: that loads neither joint 2 nor 3
+  for (truing::Joint& joint : nominal.joints) joint.mass = std::nullopt;
+  Robot at = nominal;
+  at.joints[2].alpha += 0.01;  // but for bars that are not quite parallel
+  const auto table = a_table(nominal, 60, 31);
+  const std::vector<truing::diagnosis::InputColumn> inputs = truing::diagnosis::make_inputs(at, table->data);
+  std::vector<std::int32_t> rows(table->data.rows);
+  std::iota(rows.begin(), rows.end(), 0);
+  const std::vector<std::int8_t> set(rows.size(), 0);
+  const DiagnoseOptions options;
+  const truing::diagnosis::Design design =
+      truing::diagnosis::make_design({nominal, at, {}, table->data, inputs, rows, set, rows, options});
+  const auto size_of = [&](const std::string& moment) {
+    const int column = design.column("gravity_moment.J2." + moment);
+    REQUIRE(column >= 0);
+    return design.prior[column];
+  };
+  CHECK(size_of("J2.x") > 1e-4);
+  for (const std::string moment : {"J2.x", "J2.y", "J3.x", "J3.y", "J4.x", "J4.y", "J4.z", "J5.x", "J5.y", "J5.z"}) {
+    CAPTURE(moment);
+    CHECK(size_of(moment) <= 5e-3);
+  }
+}

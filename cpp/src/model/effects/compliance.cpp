@@ -284,6 +284,7 @@ Effect gravity_moment_effect() {
   EffectTraits& traits = effect.traits;
   traits.driver = Driver::gravity_torque;
   traits.search = Search::with_unknown_weights;
+  traits.plausible = 5e-3;
   traits.documentation = {
       "Σ h · (axis · (e × g)), e the axes of every link from here on: a spring under unknown weights",
       "`gravity_moment.J2.J4.x` … [rad kg/N]: compliance × first moment", "a revolute joint"};
