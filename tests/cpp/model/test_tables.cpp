@@ -48,7 +48,7 @@ double added(const Robot& robot, const std::string& site, const Inputs& in) {
   return sum;
 }
 
-Inputs at(const Measurements& data, const Eigen::Vector3d& joints, std::size_t row = 0) {
+Inputs row_at(const Measurements& data, const Eigen::Vector3d& joints, std::size_t row = 0) {
   Inputs in;
   in.row = row;
   in.data = &data;
@@ -56,7 +56,7 @@ Inputs at(const Measurements& data, const Eigen::Vector3d& joints, std::size_t r
   return in;
 }
 
-std::string complaint(const Robot& robot, const Measurements& data = {}) {
+std::string refusal_of_tables(const Robot& robot, const Measurements& data = {}) {
   try {
     effect_terms({{"lookup_table", {}}}, robot, data);
   } catch (const std::invalid_argument& error) {
@@ -74,7 +74,7 @@ TEST_CASE("a table is linear between its knots and flat beyond them") {
   for (const auto& [q1, expected] : std::vector<std::pair<double, double>>{
            {-4.0, 3e-3}, {-1.0, 3e-3}, {-0.25, 0.0}, {0.0, -1e-3}, {0.5, 5e-4}, {2.0, 5e-3}, {9.0, 5e-3}}) {
     CAPTURE(q1);
-    CHECK(added(robot, "J2", at(none, {q1, 0.7, 0.1})) == doctest::Approx(expected).scale(1e-3));
+    CHECK(added(robot, "J2", row_at(none, {q1, 0.7, 0.1})) == doctest::Approx(expected).scale(1e-3));
   }
 }
 
@@ -85,10 +85,10 @@ TEST_CASE("of two inputs it is bilinear") {
   Measurements data;
   data.rows = 3;
   data.direction.assign(3, Column{directions});
-  CHECK(added(robot, "J1", at(data, {0.0, 0.25, 0.0}, 0)) == doctest::Approx(1.75e-3).scale(1e-3));
-  CHECK(added(robot, "J1", at(data, {0.0, 0.25, 0.0}, 1)) == doctest::Approx(3.5e-3).scale(1e-3));
-  CHECK(added(robot, "J1", at(data, {0.0, 0.25, 0.0}, 2)) == doctest::Approx(2.625e-3).scale(1e-3));
-  CHECK(contains(complaint(robot), "over dir3 needs its column"));
+  CHECK(added(robot, "J1", row_at(data, {0.0, 0.25, 0.0}, 0)) == doctest::Approx(1.75e-3).scale(1e-3));
+  CHECK(added(robot, "J1", row_at(data, {0.0, 0.25, 0.0}, 1)) == doctest::Approx(3.5e-3).scale(1e-3));
+  CHECK(added(robot, "J1", row_at(data, {0.0, 0.25, 0.0}, 2)) == doctest::Approx(2.625e-3).scale(1e-3));
+  CHECK(contains(refusal_of_tables(robot), "over dir3 needs its column"));
 }
 
 TEST_CASE("two tables of the same inputs at a site are one, their sum") {
@@ -98,8 +98,8 @@ TEST_CASE("two tables of the same inputs at a site are one, their sum") {
   add_table({"J2", {"q3"}, {{0.0, 1.0}}, {0.0, 1e-2}}, &robot);
   REQUIRE(robot.effects.size() == 1);
   const Measurements none;
-  CHECK(added(robot, "J2", at(none, {0.75, 0.0, 0.0})) == doctest::Approx(2.75e-3).scale(1e-3));
-  CHECK(added(robot, "J2", at(none, {3.0, 0.0, 0.5})) == doctest::Approx(1.1e-2).scale(1e-3));
+  CHECK(added(robot, "J2", row_at(none, {0.75, 0.0, 0.0})) == doctest::Approx(2.75e-3).scale(1e-3));
+  CHECK(added(robot, "J2", row_at(none, {3.0, 0.0, 0.5})) == doctest::Approx(1.1e-2).scale(1e-3));
 }
 
 TEST_CASE("a table has the unit of its site, and gravity torques are asked for") {
@@ -114,9 +114,9 @@ TEST_CASE("a table has the unit of its site, and gravity torques are asked for")
     CHECK(term.needs_gravity == (term.site == "base.z"));
   }
   CHECK(unit == std::map<std::string, std::string>{{"base.z", "m"}, {"J3", "m"}, {"J2.alpha", "rad"}});
-  CHECK(contains(complaint(three_joints()), "needs a robot that carries one"));
+  CHECK(contains(refusal_of_tables(three_joints()), "needs a robot that carries one"));
   for (Joint& joint : robot.joints) joint.mass.reset();
-  CHECK(contains(complaint(robot), "needs gravity torques"));
+  CHECK(contains(refusal_of_tables(robot), "needs gravity torques"));
 }
 
 TEST_CASE("names of parameters that are none of a table's are refused") {
@@ -126,12 +126,12 @@ TEST_CASE("names of parameters that are none of a table's are refused") {
     CAPTURE(name);
     Robot robot = three_joints();
     robot.effects = {{"lookup_table", {}, {{name, 1e-3}}}};
-    CHECK(contains(complaint(robot), "expected"));
+    CHECK(contains(refusal_of_tables(robot), "expected"));
   }
   for (const char* input : {"q0", "q4", "order", "q1x", "x1"}) {
     CAPTURE(input);
     Robot robot = three_joints();
     robot.effects = {{"lookup_table", {}, {{std::string("lookup_table.J2:") + input + "@0", 1e-3}}}};
-    CHECK(contains(complaint(robot), "expected q1 ..., dir1"));
+    CHECK(contains(refusal_of_tables(robot), "expected q1 ..., dir1"));
   }
 }
