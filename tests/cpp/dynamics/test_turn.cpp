@@ -93,7 +93,7 @@ TEST_CASE("what the stop operator remembers fades where nothing moves") {
 
 TEST_CASE("friction that fades at rest is found where recordings show it") {
   for (const double fade : {0.0, 1.0, 10.0}) {
-    const std::vector<Recording> rests = recorded_rests(with_fading_friction(fade), 6, kSanitized ? 15.0 : 30.0);
+    const std::vector<Recording> rests = recorded_rests(with_fading_friction(fade), 6, 30.0);
     const TorqueDiagnosis d = dynamics::diagnose(swung::level_arm(1), rests);
     CHECK(dynamics::turns_of(d.robot).front().fade == fade);
     CHECK(d.errors[2].held_out.front().rms < 0.15);
