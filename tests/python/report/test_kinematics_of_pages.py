@@ -24,8 +24,9 @@ from truing.report.json_text import without_nan
 
 POSES = 20
 NEAR = 1e-9  # [m]; what is promised is 1e-6
-# Effects that a page cannot show: they belong to instrument, clocks or motor, or are values of the model.
-NOT_DRAWN = {"windup", "scale", "drift", "time_offset", "wire_pull"}
+# Effects that a page does not show: they belong to instrument, clocks or motor, are values of the model, or
+# have no law.
+NOT_DRAWN = {"windup", "scale", "drift", "time_offset", "wire_pull", "lookup_table"}
 ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
 <joint name="rail" type="prismatic"><parent link="a"/><child link="b"/>
 <origin xyz="0.1 0.2 0.3" rpy="0.1 -0.4 0.7"/><axis xyz="0 0.6 0.8"/>
