@@ -1192,9 +1192,12 @@ class IdentifyOptions:
     prior_noise = 0.0: Noise that priors are weighed against: standard deviation of a position component [m], of rows with
         a sigma of their own a factor to it. 0: what a fit without priors leaves.
     reject_beyond = 6.0: Loss `reject`: rows whose residual is longer than this many medians.
+    shrink_beyond = 0.05: Where the rows know a link only to more than this [rad, m], it would run away: links are then fitted
+        near the nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors
+        or bounds of one's own.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, priors: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}, prior_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, priors: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}, prior_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, shrink_beyond: typing.SupportsFloat | typing.SupportsIndex = 0.05, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -1359,6 +1362,16 @@ class IdentifyOptions:
     def seed(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
+    def shrink_beyond(self) -> float:
+        """
+        Where the rows know a link only to more than this [rad, m], it would run away: links are then fitted
+        near the nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors
+        or bounds of one's own.
+        """
+    @shrink_beyond.setter
+    def shrink_beyond(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def solver(self) -> typing.Literal['lm', 'ceres']:
         """
         What minimises.
@@ -1482,6 +1495,12 @@ class Identification:
     def set(self) -> numpy.typing.NDArray[numpy.int8]:
         """
         Shape=(n,): 0 train, 1 test, for every row.
+        """
+    @property
+    def shrunk_to(self) -> float:
+        """
+        [rad, m] standard deviation about the nominal robot under which links were fitted; 0: freely. See
+        shrink_beyond.
         """
     @property
     def solver(self) -> SolverSummary:

@@ -67,6 +67,10 @@ class IdentifyKeywords(TypedDict, total=False):
     a sigma of their own a factor to it. 0: what a fit without priors leaves."""
     reject_beyond: float
     """Loss `reject`: rows whose residual is longer than this many medians."""
+    shrink_beyond: float
+    """Where the rows know a link only to more than this [rad, m], it would run away: links are then fitted
+    near the nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors
+    or bounds of one's own."""
     threads: int
     """0: as many as the machine has."""
 

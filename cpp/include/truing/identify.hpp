@@ -56,7 +56,11 @@ struct IdentifyOptions : ParameterSelection, SolverOptions {
   /// their own a factor to it. 0: what a fit without priors leaves.
   double prior_noise = 0.0;
   double reject_beyond = 6.0;  ///< loss `reject`: rows whose residual is longer than this many medians
-  int threads = 0;             ///< 0: as many as the machine has
+  /// Where the rows know a link only to more than this [rad, m], it would run away: links are then fitted near the
+  /// nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors or bounds of one's
+  /// own.
+  double shrink_beyond = 0.05;
+  int threads = 0;  ///< 0: as many as the machine has
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;
@@ -84,8 +88,10 @@ struct Identification {
   SolverSummary solver;                    ///< how the solver ended
   double noise_sigma = 0.0;                ///< [m] of one position component (or distance), from the training residuals
   double rotation_noise_sigma = 0.0;       ///< [rad] of one rotation component; NaN: none measured
-  int rank = 0;                            ///< number of parameters fitted
-  int columns = 0;                         ///< number of parameters asked for
+  /// [rad, m] standard deviation about the nominal robot under which links were fitted; 0: freely. See shrink_beyond.
+  double shrunk_to = 0.0;
+  int rank = 0;     ///< number of parameters fitted
+  int columns = 0;  ///< number of parameters asked for
 };
 
 /// Finds the robot's parameters from measurements.

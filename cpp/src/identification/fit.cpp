@@ -228,6 +228,10 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   return out;
 }
 
+double noise_of(const Job& job, const Fit& found) {
+  return noise_of(job, found.fitted, Equations(job, found.fitted, job.rows).norms(found));
+}
+
 Selection select_observable(const Job& job, const std::vector<int>& free, const Eigen::VectorXd& values) {
   const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, job.rows), free,
                             job.options.threads);

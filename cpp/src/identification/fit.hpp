@@ -55,6 +55,9 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
 /// The fit in the deepest of its hollows. Nobody looks for others where priors or bounds hold what is hardly seen.
 Fit deepest_fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start);
 
+/// Noise of a unit-weight component, from the median row of a fit; NaN: no more values than parameters.
+double noise_of(const Job& job, const Fit& found);
+
 /// Splits the free parameters into those that the rows can see and combinations that they cannot.
 Selection select_observable(const Job& job, const std::vector<int>& free, const Eigen::VectorXd& values);
 

@@ -7,6 +7,7 @@
 
 #include "identification/asked.hpp"
 #include "identification/report.hpp"
+#include "identification/shrink.hpp"
 #include "identification/start.hpp"
 #include "identification/uncertainty.hpp"
 #include "truing/identify.hpp"
@@ -26,6 +27,7 @@ bool IdentifyOptions::is_valid(std::string* error) const {
   if (!(rms_fall >= 0.0) || !(gradient >= 0.0)) return fail("rms_fall and gradient must not be negative");
   if (!(rank_tolerance > 0.0 && rank_tolerance < 1.0)) return fail("rank_tolerance must be in (0, 1)");
   if (!(reject_beyond > 1.0)) return fail("reject_beyond must be more than 1 median");
+  if (!(shrink_beyond > 0.0)) return fail("shrink_beyond must be positive [rad, m]; infinity: never");
   if (!bounds.empty() && solver != Solver::ceres) return fail("bounds need solver = ceres");
   if (frame_by == FrameBy::svd && solver == Solver::ceres) return fail("frame_by = svd needs solver = lm");
   if (!(prior_noise >= 0.0 && std::isfinite(prior_noise))) return fail("prior_noise must be finite and not negative");
@@ -62,6 +64,32 @@ Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen
   return found;
 }
 
+/// The fit anew, its links near the nominal robot: under a prior of a size that the rows choose, until it stays. Gives
+/// the size; 0, and leaves the fit: the rows say that the nominal robot tells nothing.
+double shrink(const Job& job, const Eigen::VectorXd& start, std::vector<std::vector<double>>* bases, Fit* found) {
+  constexpr double kFirst = 0.01;  // [rad, m]
+  constexpr int kRounds = 5;
+  const Fit free = *found;
+  const std::vector<std::vector<double>> bases_of_free = *bases;
+  IdentifyOptions options = job.options;
+  options.prior_noise = noise_of(job, free);
+  const Job near_nominal{job.model, job.data, job.bases, options, job.rows};
+  const std::vector<int> links = links_of(job.model, free.fitted);
+  double size = 0.0, next = kFirst;
+  for (int round = 0; round < kRounds && next != size; ++round) {
+    size = next;
+    for (const int k : links) options.priors[job.model.parameters[free.fitted[k]].name] = size;
+    *bases = make_bases(job.model, job.data);
+    *found = fit_with_gravity(near_nominal, free.fitted, start, bases);
+    next = likeliest_error(near_nominal, *found, links);
+    if (std::isfinite(next)) continue;
+    *found = free;
+    *bases = bases_of_free;
+    return 0.0;
+  }
+  return size;
+}
+
 }  // namespace
 }  // namespace identification
 
@@ -84,7 +112,14 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   if (model.terms.size() != nominal_model.terms.size()) bases = make_bases(model, data);
   const Job job{model, data, bases, options, rows.train};
   const Seen seen = what_is_seen(job, asked, start.values);
-  const Fit found = fit_with_gravity(job, seen.selection.fitted, start.values, &bases);
+  Fit found = fit_with_gravity(job, seen.selection.fitted, start.values, &bases);
+  Uncertainty known = uncertainty(job, found, rows.pose, asked.content.poses);
+  double shrunk_to = 0.0;
+  if (options.priors.empty() && options.bounds.empty() &&
+      barely_seen(links_of(model, found.fitted), known.covariance, options.shrink_beyond)) {
+    shrunk_to = shrink(job, start.values, &bases, &found);
+    known = uncertainty(job, found, rows.pose, asked.content.poses);
+  }
 
   Identification result;
   result.set = rows.set;
@@ -96,7 +131,7 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   result.rank = static_cast<int>(seen.selection.fitted.size());
   result.columns = static_cast<int>(seen.free.size()) + (seen.scale_carrier >= 0 ? 1 : 0);
   for (const std::int32_t row : found.rejected) result.rejected_rows.push_back(static_cast<std::size_t>(row));
-  const Uncertainty known = uncertainty(job, found, rows.pose, asked.content.poses);
+  result.shrunk_to = shrunk_to;
   result.covariance = known.covariance;
   result.noise_sigma = known.noise;
   result.rotation_noise_sigma = known.rotation_noise;

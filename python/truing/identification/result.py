@@ -77,6 +77,7 @@ def identification_dict(
         "noise_sigma_m": result.noise_sigma,
         "noise_from_repeats_m": noise_from_repeats,
         "rotation_noise_sigma_rad": result.rotation_noise_sigma,
+        "shrunk_to": result.shrunk_to,
         "rank": result.rank,
         "columns": result.columns,
         "seed": seed,

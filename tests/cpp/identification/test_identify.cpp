@@ -47,12 +47,16 @@ struct Ur10Case {
   Robot nominal = ur10(), truth;
   std::unique_ptr<Table> table;
 
-  Ur10Case(std::size_t rows, double sigma, unsigned seed, What what = What::position) {
+  /// `wrist`: share of their range that the last three joints use.
+  Ur10Case(std::size_t rows, double sigma, unsigned seed, What what = What::position, double wrist = 1.0) {
     truth = perturbed(nominal, 1e-3, 1e-3, seed);
     truth.joints[2].beta = 5e-4;
     truth.joints[3].beta = -7e-4;
     truth.T_measurement_base = somewhere();
     table = random_joints(truth, rows, seed + 1);
+    for (std::size_t k = 3; k < 6; ++k) {
+      for (double& q : *table->columns[k]) q *= wrist;
+    }
     measure(table.get(), truth, what, sigma, seed + 2);
   }
 };
@@ -222,6 +226,58 @@ TEST_CASE("priors let fewer values than parameters be fitted, but not fewer than
   const Identification found = truing::identify(c.nominal, c.table->data, options);
   CHECK(found.solver.converged);
   CHECK(fresh_rms(c.truth, found.robot, 25) < fresh_rms(c.truth, found.before, 25));
+}
+
+TEST_CASE("links that the rows hardly see stay near the nominal robot, by as much as the others are off") {
+  IdentifyOptions freely, options;
+  freely.shrink_beyond = std::numeric_limits<double>::infinity();
+  freely.test_share = options.test_share = 0.0;
+  for (const unsigned seed : {30u, 31u, 32u}) {
+    CAPTURE(seed);
+    const Ur10Case c(40, 1e-4, seed, What::position, 0.02);  // the wrist nearly at rest
+    const Identification free = truing::identify(c.nominal, c.table->data, freely);
+    const Identification held = truing::identify(c.nominal, c.table->data, options);
+    CHECK(free.shrunk_to == 0.0);
+    CHECK(held.shrunk_to > 3e-4);  // of 1e-3
+    CHECK(held.shrunk_to < 4e-3);
+    CHECK(std::any_of(held.warnings.begin(), held.warnings.end(),
+                      [](const std::string& w) { return contains(w, "the rows hardly see some links"); }));
+    double runs_away = 0.0, stays = 0.0;
+    for (std::size_t k = 0; k < held.parameters.size(); ++k) {
+      const truing::Parameter &was = free.parameters[k], &is = held.parameters[k];
+      if (is.frozen || is.name[0] != 'J') continue;
+      runs_away = std::max(runs_away, std::abs(was.value - was.nominal));
+      stays = std::max(stays, std::abs(is.value - is.nominal));
+    }
+    CHECK(runs_away > 0.02);
+    CHECK(stays < 0.01);
+    CHECK(fresh_rms(c.truth, held.robot, seed) < 0.2 * fresh_rms(c.truth, free.robot, seed));
+    CHECK(fresh_rms(c.truth, held.robot, seed) < fresh_rms(c.truth, held.before, seed));
+  }
+}
+
+TEST_CASE("a nominal robot that tells nothing of the links does not hold them") {
+  const Ur10Case c(100, 1e-4, 34, What::position, 0.02);
+  Robot other = c.nominal;
+  for (const std::size_t k : {1u, 2u, 3u}) {
+    other.joints[k].offset += 0.5;
+    other.joints[k].a *= 1.5;
+    other.joints[k].d += 0.2;
+  }
+  const Identification found = truing::identify(other, c.table->data);
+  CHECK(found.shrunk_to == 0.0);
+  CHECK(found.test->after.rms < 1e-3);
+}
+
+TEST_CASE("where the rows see every link, or somebody knows more of them, nothing is shrunk") {
+  const Ur10Case seen(200, 1e-4, 33), hardly(40, 1e-4, 33, What::position, 0.02);
+  IdentifyOptions options;
+  const Identification found = truing::identify(seen.nominal, seen.table->data, options);
+  CHECK(found.shrunk_to == 0.0);
+  options.priors = {{"J5.theta", 1e-2}};
+  CHECK(truing::identify(hardly.nominal, hardly.table->data, options).shrunk_to == 0.0);
+  options.shrink_beyond = 0.0;
+  CHECK(contains(complaint(seen.nominal, seen.table->data, options), "shrink_beyond must be positive"));
 }
 
 TEST_CASE("a robot with fitted effects knows the range that they were fitted on") {

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+
+#include "identification/shrink.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/evidence.hpp"
+#include "math/constants.hpp"
+
+namespace truing::identification {
+
+std::vector<int> links_of(const Model& model, const std::vector<int>& fitted) {
+  std::vector<int> out;
+  for (std::size_t k = 0; k < fitted.size(); ++k) {
+    const Role role = model.parameters[fitted[k]].role;
+    if (role == Role::geometry || role == Role::offset || role == Role::ratio) out.push_back(static_cast<int>(k));
+  }
+  return out;
+}
+
+bool barely_seen(const std::vector<int>& links, const Eigen::MatrixXd& covariance, double beyond) {
+  return std::any_of(links.begin(), links.end(), [&](int k) { return std::sqrt(covariance(k, k)) > beyond; });
+}
+
+/// Sums of the rows about the nominal links, where the columns are those of a fit.
+static Gram sums_about_nominal(const Job& job, const Fit& found, const std::vector<int>& links) {
+  const Evaluator evaluator(job.model, job.data, job.bases, make_segments(job.data, without(job.rows, found.rejected)),
+                            found.fitted, job.options.threads);
+  Weighing of_rows = found.weighing;
+  of_rows.prior = {};
+  NormalEquations here;
+  evaluator.normal_equations(found.values, of_rows, &here);
+  const Eigen::VectorXd nominal = initial_values(job.model);
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(here.gram.rows());
+  for (const int k : links) {
+    const int parameter = found.fitted[k];
+    off[k] = found.values[parameter] - nominal[parameter];
+  }
+  // r at the nominal links is r - J off here: it is to be explained by -J times what the links are off.
+  return {here.gram, here.gram * off - here.gradient,
+          here.squares - 2.0 * off.dot(here.gradient) + off.dot(here.gram * off), static_cast<double>(here.components)};
+}
+
+double likeliest_error(const Job& job, const Fit& found, const std::vector<int>& links) {
+  constexpr double kLargest = 0.1;  // [rad, m]
+  const Gram sums = sums_about_nominal(job, found, links);
+  std::vector<int> others;
+  for (int k = 0; k < sums.xx.rows(); ++k) {
+    if (std::find(links.begin(), links.end(), k) == links.end()) others.push_back(k);
+  }
+  const std::vector<ColumnGroup> none;
+  const Evidence evidence(sums, none, others, Eigen::VectorXd::Constant(sums.xx.rows(), kLargest));
+  const double size = kLargest * evidence.gain(evidence.evaluate({}), links, 0.0).scale;
+  return size < kLargest ? size : kInfinity;
+}
+
+}  // namespace truing::identification

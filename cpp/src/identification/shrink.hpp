@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: 2026 the truing authors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "identification/fit.hpp"
+
+namespace truing::identification {
+
+// What the rows hardly see of a robot's links runs away in a fit: to whole turns and to metres. All links are then
+// thought to be off by about as much as each other, and the rows say by how much (empirical Bayes: MacKay, Bayesian
+// interpolation, Neural Computation 4 (1992) 415).
+
+/// Of the fitted parameters those of links, joint zeros and gear ratios, by their place among the fitted ones.
+std::vector<int> links_of(const Model& model, const std::vector<int>& fitted);
+
+/// Whether the rows know one of these links only to more than `beyond` [rad, m].
+bool barely_seen(const std::vector<int>& links, const Eigen::MatrixXd& covariance, double beyond);
+
+/// Standard deviation of the links about the nominal robot [rad, m] that the rows speak for, where a fit stands.
+/// Infinite: as much as no robot is off, or more.
+double likeliest_error(const Job& job, const Fit& found, const std::vector<int>& links);
+
+}  // namespace truing::identification
