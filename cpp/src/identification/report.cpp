@@ -201,8 +201,8 @@ std::vector<std::string> make_warnings(const Identification& result, std::size_t
                        three_digits(1e3 * train.rms) + " mm in training: the data cannot support this many parameters");
   }
   if (result.shrunk_to > 0.0)
-    warnings.push_back("the rows hardly see some links: all are fitted near the nominal robot, to which " +
-                       three_digits(1e3 * result.shrunk_to) + " mm and mrad are thought likely");
+    warnings.push_back("the rows hardly see some links: all are held near the nominal robot, within about " +
+                       three_digits(1e3 * result.shrunk_to) + " mm and mrad, as the rows have it");
   const std::string weak = barely_seen(result.parameters);
   if (!weak.empty()) warnings.push_back("barely seen, standard error in brackets: " + weak);
   if (!result.rejected_rows.empty())
