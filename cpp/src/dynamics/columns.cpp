@@ -161,13 +161,13 @@ class TableSum {
 /// Sums of one tile, by joint and fold.
 using TileGrams = std::vector<std::vector<Gram>>;
 
-/// The rows of a tile that are fitted, by fold: those of these folds in which the joint moves and its torque was
-/// measured.
-std::vector<std::vector<Index>> fitted_rows(const Tile& tile, Index joint, const Folds& folds) {
+/// Such rows of a tile, by fold: of these folds, and the torque was measured.
+std::vector<std::vector<Index>> rows_of(const Tile& tile, Index joint, const Folds& folds, Rows rows) {
   std::vector<std::vector<Index>> out(static_cast<std::size_t>(folds.count));
   const VectorXd time = tile.own_time();
   for (Index i = 0; i < tile.count; ++i) {
-    if (tile.moving(i, joint) == 0.0 || std::isnan(tile.measured(i, joint))) continue;
+    const bool left_out = rows == Rows::fitted && tile.moving(i, joint) == 0.0;
+    if (left_out || std::isnan(tile.measured(i, joint))) continue;
     const int fold = folds.fold(tile.recording, time[i]);
     if (fold >= 0) out[static_cast<std::size_t>(fold)].push_back(i);
   }
@@ -175,7 +175,7 @@ std::vector<std::vector<Index>> fitted_rows(const Tile& tile, Index joint, const
 }
 
 TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const MatrixXd& predicted, const Folds& folds,
-                   const std::vector<SumOrder>& orders) {
+                   const std::vector<SumOrder>& orders, Rows which) {
   thread_local TableSum sum;  // its room is large, and clearing pages takes long
   TileGrams out(columns->size(), std::vector<Gram>(static_cast<std::size_t>(folds.count)));
   for (std::size_t j = 0; j < columns->size(); ++j) {
@@ -183,7 +183,7 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
     MatrixXd& table = (*columns)[j];
     if (table.rows() == 0) continue;
     table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
-    const std::vector<std::vector<Index>> rows = fitted_rows(tile, joint, folds);
+    const std::vector<std::vector<Index>> rows = rows_of(tile, joint, folds, which);
     for (std::size_t f = 0; f < rows.size(); ++f) {
       if (!rows[f].empty()) out[j][f] = sum.of(table, rows[f], orders[j]);
     }
@@ -315,7 +315,7 @@ void add_known(const std::vector<Gram>& earlier, const SumOrder& order, std::vec
 }  // namespace
 
 TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                      const Folds& folds, const EarlierSums& earlier) {
+                      const Folds& folds, const EarlierSums& earlier, Rows rows) {
   auto out = std::make_shared<std::vector<JointGrams>>();
   std::vector<SumOrder> orders;
   for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j) {
@@ -329,8 +329,9 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
       set_torque(seen, &tile);
     else
       set_direction(seen.turns(), &tile);
-    columns.use(&tile, true,
-                [&](DesignColumns::Tables& tables) { lot[k] = grams_of(&tables, tile, predicted, folds, orders); });
+    columns.use(&tile, true, [&](DesignColumns::Tables& tables) {
+      lot[k] = grams_of(&tables, tile, predicted, folds, orders, rows);
+    });
   };
   const auto add = [&](std::size_t k) {
     for (std::size_t j = 0; j < out->size(); ++j) {

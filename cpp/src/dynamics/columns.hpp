@@ -71,10 +71,12 @@ struct EarlierSums {
   bool turned = false;
 };
 
-/// Measured torque less that of `subtracted` against the design's columns; rows at rest are left out. Terms that need a
-/// torque see that of `seen`.
+/// Rows of a joint: those that are fitted, in which it moves, or all that are judged.
+enum class Rows { fitted, judged };
+
+/// Measured torque less that of `subtracted` against the design's columns. Terms that need a torque see that of `seen`.
 TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                      const Folds& folds, const EarlierSums& earlier = {});
+                      const Folds& folds, const EarlierSums& earlier = {}, Rows rows = Rows::fitted);
 
 /// What the model and the columns times values leave; no column that has a value may need a torque.
 std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const Eigen::VectorXd& values,

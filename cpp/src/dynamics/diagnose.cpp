@@ -343,7 +343,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {
     std::vector<Noise> noise_of_functions = noise;
     const Account functions = with_functions(problem, account, of_account, limits, &noise_of_functions);
-    return named(problem, groundwork, account, noise, functions, noise_of_functions);
+    return named(problem, groundwork, account, noise, functions, noise_of_functions, limits.least_gain);
   };
   std::optional<Account> given;
   if (!problem.fitted_before) given = of_given_inertias(problem, *columns, grams, model, noise, free, limits);

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "dynamics/beside.hpp"
 #include "dynamics/judge.hpp"
 #include "dynamics/payload.hpp"
 #include "estimation/confidence.hpp"
@@ -746,22 +747,37 @@ std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice&
 
 namespace {
 
-/// The robot with all that was fitted, also what is too small to be named, and the free functions beside it.
-TorqueModel model_with_functions(const Problem& problem, Account functions) {
-  Choice& all = functions.choice;
-  all.groups.insert(all.groups.end(), functions.small.groups.begin(), functions.small.groups.end());
-  all.scales.insert(all.scales.end(), functions.small.scales.begin(), functions.small.scales.end());
+/// Errors of the named robot, and at joints with free functions that help, those of all that was fitted with these.
+/// `model`: the named robot's, over whose torque functions of the load were fitted.
+TorqueErrors errors_with_functions(const Problem& problem, Account functions, const TorqueModel& model,
+                                   const TorqueErrors& of_named, double least_gain) {
+  functions.choice = with_functions_that_help(problem, functions, model, least_gain);
+  const std::vector<int>& groups = functions.choice.groups;
+  std::set<std::size_t> joints;
+  for (const int g : groups) {
+    const TorqueGroup& group = group_of(*functions.design, g);
+    if (group.effect.empty()) joints.insert(static_cast<std::size_t>(group.joint));
+  }
+  TorqueErrors out = of_named;
+  out.model = "with_unknown";
+  if (joints.empty()) return out;
   const Naming naming(functions);
   std::vector<std::string> said_already;
   const Robot robot = robot_of(problem, functions, naming, &said_already);
-  return with_free_functions(problem, robot, *functions.design, naming.fit());
+  const TorqueModel whole = with_free_functions(problem, robot, *functions.design, naming.fit()).seeing(model);
+  const TorqueErrors with = errors_of(problem, {{out.model, whole}}).front();
+  for (const std::size_t j : joints) {
+    out.held_out[j] = with.held_out[j];
+    out.train[j] = with.train[j];
+  }
+  return out;
 }
 
 }  // namespace
 
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
                       const std::vector<Noise>& noise, const Account& functions,
-                      const std::vector<Noise>& noise_of_functions) {
+                      const std::vector<Noise>& noise_of_functions, double least_gain) {
   const std::vector<TorqueEffect>& own = problem.own_effects;
   const Naming naming(account), all(functions);
   TorqueDiagnosis out;
@@ -779,11 +795,8 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   // Errors are those of the robot that is handed over.
   out.robot = robot_of(problem, account, naming, &out.warnings);
   const TorqueModel model = model_of(out.robot, problem);
-  // Functions of the load were fitted over the torque of what was named.
-  const TorqueModel with_unknown = model_with_functions(problem, functions).seeing(model);
-  out.errors = errors_of(
-      problem,
-      {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}, {"with_unknown", with_unknown}});
+  out.errors = errors_of(problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}});
+  out.errors.push_back(errors_with_functions(problem, functions, model, out.errors[2], least_gain));
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
   out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);

@@ -22,9 +22,10 @@ Choice without_functions_that_fail(Account account, double least_gain);
 /// numbers that the answer has.
 std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice& same);
 
-/// `functions`: the account with free functions beside what was named. Noise is that of either.
+/// `functions`: the account with free functions beside what was named. Noise is that of either. `least_gain`: of a
+/// joint's squares on folds, without which its functions do not help.
 TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, const Account& account,
                       const std::vector<Noise>& noise, const Account& functions,
-                      const std::vector<Noise>& noise_of_functions);
+                      const std::vector<Noise>& noise_of_functions, double least_gain);
 
 }  // namespace truing::dynamics

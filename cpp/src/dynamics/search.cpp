@@ -172,25 +172,26 @@ bool Search::may_enter(const Choice& choice, int group, const SearchLimits& limi
                       [&](int in) { return same_place(design_.groups[static_cast<std::size_t>(in)], g); });
 }
 
-/// Folds that were not fitted, by enough over all of them, and over those that are left without the quarter that gains
-/// most, or a single fold could decide.
-bool Search::predicts(const VectorXd& before, const VectorXd& after, const SearchLimits& limits) const {
+bool Search::gains_on_folds(const VectorXd& before, const VectorXd& after, double least_part) {
   std::vector<std::pair<double, double>> folds;  // gain, and what it is a part of
   for (Index f = 0; f < before.size(); ++f)
     if (before[f] > 0.0) folds.emplace_back(before[f] - after[f], before[f]);  // else nothing moved
   if (folds.size() < 2) return false;
   std::sort(folds.begin(), folds.end());
-  // Every joint counts alike in the sum: one joint's errors are the part that it has of it.
-  const double least = limits.least_gain / static_cast<double>(joints_);
   const auto gains = [&](std::size_t count) {
     double gain = 0.0, of = 0.0;
     for (std::size_t k = 0; k < count; ++k) {
       gain += folds[k].first;
       of += folds[k].second;
     }
-    return gain > least * of;
+    return gain > least_part * of;
   };
   return gains(folds.size()) && gains(folds.size() - (folds.size() + 3) / 4);
+}
+
+// Every joint counts alike in the sum: one joint's errors are the part that it has of it.
+bool Search::predicts(const VectorXd& before, const VectorXd& after, const SearchLimits& limits) const {
+  return gains_on_folds(before, after, limits.least_gain / static_cast<double>(joints_));
 }
 
 /// Parameters of the group within what machines have; what is beyond stands for something else.

@@ -86,6 +86,10 @@ class Search {
   /// Squared error on other rows, by the fit to all folds.
   static double squares_on(const FoldGram& other, const Evidence::State& state);
 
+  /// Squared errors of folds that were not fitted fall by more than a part of them, over all folds and over those that
+  /// are left without the quarter that gains most, or a single fold could decide.
+  static bool gains_on_folds(const Eigen::VectorXd& before, const Eigen::VectorXd& after, double least_part);
+
   /// The choice less its group number `at`.
   static Choice without(const Choice& choice, std::size_t at);
 
