@@ -17,7 +17,8 @@ import yaml
 from numpy.typing import NDArray
 
 import truing
-from truing.dynamics.export import Exported, coupling_matrix, export, set_readings
+from truing.dynamics import Recording, predict
+from truing.dynamics.export import Exported, Simulator, coupling_matrix, export, set_readings
 from truing.model import AppliedEffect, Joint, Robot, forward_kinematics, robot_from_urdf
 
 Floats = NDArray[np.float64]
@@ -393,6 +394,31 @@ def test_what_belongs_to_the_measurement_is_said_and_not_written(tmp_path: Path)
         "my_own",
     }
     assert exported.model.read_text(encoding="utf-8") == plain.model.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("to", ["mjcf", "urdf"])
+def test_friction_that_fades_at_rest_is_said_with_what_the_torques_lose(
+    tmp_path: Path, to: Simulator
+) -> None:
+    robot = arm("urdf")
+    time = np.arange(0.0, 12.0, 0.01)
+    position = np.zeros((time.size, len(robot.driven_joints())))
+    for begin, way in ((0.0, 0.5), (4.0, -0.7), (8.0, 0.5)):  # in a second, then at rest
+        s = np.clip(time - begin, 0.0, 1.0)
+        position[:, 0] += way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    motion = Recording("rests", time=time, position=position, torque=np.zeros_like(position))
+    constants = {"J1": 3.0, "J1__turn_travel": 1e-4}
+    lasting = robot.replace(torque_effects=[applied("coulomb", **constants)])
+    fading = robot.replace(torque_effects=[applied("coulomb", **constants, J1__turn_fade=1.0)])
+    lost = predict(fading, motion).torque - predict(lasting, motion).torque
+    left = {item.name: item for item in export(fading, to, tmp_path / to, recordings=[motion]).not_written}
+    item = left.pop("coulomb.J1.turn_fade")
+    assert "holds a resting joint" in item.reason
+    # Of other filters: a bristle of 0.1 mrad feels what is left of a motion where it ends.
+    assert item.size == pytest.approx(np.sqrt(np.mean(lost[:, 0] ** 2)), rel=0.15)
+    assert item.size > 1.0
+    lasts = export(lasting, to, tmp_path / "lasting", recordings=[motion])
+    assert {item.name for item in lasts.not_written} == set(left)
 
 
 def test_urdf_written_anew_is_the_same_robot(tmp_path: Path) -> None:

@@ -69,6 +69,7 @@ ONLY_MEASURED = {
     "time_offset": "belongs to the measurement: torques and positions have other clocks",
     "payload_place": "belongs to the recordings: the payload that they state is no part of the robot",
 }
+_HOLDS = "dry friction of simulators holds a resting joint for good"
 _NO_PLACE = {
     "joint_elasticity": "needs a further hinge and a motor body in every joint: the model's joints would no"
     " longer be the robot's",
@@ -294,6 +295,10 @@ def _add(
             parts.beside.append((name, j, by, values))
     elif name in _PER_JOINT:
         _add_to_joint(parts, name, j, values, joint)
+        if min(values.get("turn_travel", 0.0), values.get("turn_fade", 0.0)) > 0.0:
+            parts.not_written.append(
+                NotWritten(f"{name}.{joint}.turn_fade", _faded(j, values, reference), _HOLDS)
+            )
     else:
         parts.not_written.append(
             NotWritten(name, np.nan, "an effect of one's own, whose law only its Python code knows")
@@ -340,6 +345,20 @@ def _add_to_joint(parts: Parts, name: str, j: int, values: dict[str, float], joi
             parts.beside.append((name, j, j, rest))
     else:
         parts.beside.append((name, j, j, values))
+
+
+def _faded(j: int, values: dict[str, float], reference: Reference) -> float:
+    """[Nm | N] of what Coulomb friction forgets at rest (`stop_operator` in cpp/src/dynamics/turn.cpp)."""
+    if reference.time.size < 2:
+        return 0.0
+    kept = np.exp(-(reference.time[1] - reference.time[0]) / values["turn_fade"])
+    holding = fading = 0.0
+    lost = [0.0]
+    for move in (np.diff(reference.q[:, j]) / values["turn_travel"]).tolist():
+        holding = min(max(holding + move, -1.0), 1.0)
+        fading = min(max(kept * fading + move, -1.0), 1.0)
+        lost.append(holding - fading)
+    return abs(values.get("", 0.0)) * rms(np.array(lost))
 
 
 def _measured_size(name: str, j: int, values: dict[str, float], reference: Reference) -> float:
