@@ -153,6 +153,16 @@ Choice without_these(const Choice& choice, const std::vector<int>& gone) {
   return out;
 }
 
+Choice only_these(const Choice& choice, const std::vector<int>& groups) {
+  Choice out;
+  for (std::size_t k = 0; k < choice.groups.size(); ++k) {
+    if (std::find(groups.begin(), groups.end(), choice.groups[k]) == groups.end()) continue;
+    out.groups.push_back(choice.groups[k]);
+    out.scales.push_back(choice.scales[k]);
+  }
+  return out;
+}
+
 int add_fine_function(Work* work, const Robot& robot, std::size_t joint, const std::vector<int>& which) {
   std::vector<std::int32_t> rows;
   for (std::size_t i = 0; i < work->design.row.size(); ++i) {

@@ -224,17 +224,6 @@ bool keep_what_is_confirmed(const Work& work, const Evidence& evidence, Decision
   }
 }
 
-/// Some of the groups of a choice.
-Choice only_these(const Choice& choice, const std::vector<int>& groups) {
-  Choice out;
-  for (std::size_t k = 0; k < choice.groups.size(); ++k) {
-    if (std::find(groups.begin(), groups.end(), choice.groups[k]) == groups.end()) continue;
-    out.groups.push_back(choice.groups[k]);
-    out.scales.push_back(choice.scales[k]);
-  }
-  return out;
-}
-
 /// What a robot file can hold.
 bool is_in_catalogue(const Explanation& e) { return e.kind == Kind::catalogue || e.kind == Kind::all_geometry; }
 

@@ -196,6 +196,8 @@ int input_named(const Work& work, const std::string& name);
 Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at);
 /// A choice less some groups.
 Choice without_these(const Choice& choice, const std::vector<int>& gone);
+/// Some groups of a choice.
+Choice only_these(const Choice& choice, const std::vector<int>& groups);
 
 /// The groups that may enter first, on a Gram of their columns only: corrections of laws and fine drifts are many
 /// columns.

@@ -97,6 +97,11 @@ static std::vector<std::string> other_forms(const Design& design, const Evidence
   return out;
 }
 
+/// Variance of what these groups of a choice leave alone: beside others they would leave less.
+static double variance_left_by(const Work& work, const Choice& choice, const std::vector<int>& groups) {
+  return evidence_now(work).evaluate(only_these(choice, groups)).sigma2;
+}
+
 RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, const Robot& robot,
                      const Evidence::State& state, const std::vector<int>& groups) {
   const Design& design = work.design;
@@ -107,7 +112,8 @@ RefitTask refit_task(const Work& work, const std::vector<InputColumn>& inputs, c
   out.options.seed = options.seed;
   out.options.own_effects = options.own_effects;
   out.options.free = targets_of(robot);
-  out.options.prior_noise = work.noise.unit * std::sqrt(state.sigma2 * work.noise.design_effect);
+  out.options.prior_noise =
+      work.noise.unit * std::sqrt(variance_left_by(work, state.choice, groups) * work.noise.design_effect);
   std::set<std::pair<std::string, std::string>> asked;
   for (std::size_t at = 0; at < state.choice.groups.size(); ++at) {
     const int g = state.choice.groups[at];

@@ -113,6 +113,20 @@ TEST_CASE("a part that poses do not know is that of equal parts of all fits") {
   CHECK(of_three - of_two < 1.0 / 6.0);
 }
 
+TEST_CASE("the noise of a fit is what its own groups leave, whatever else was found") {
+  using truing::diagnosis::evidence_now;
+  truing::diagnosis::Work work = two_candidates(0.1);
+  work.design.column_names = {"base", "first", "second"};
+  work.noise.unit = 2.0;
+  const truing::estimation::Evidence::State both = evidence_now(work).evaluate({{0, 1}, {1.0, 1.0}});
+  const auto noise = [&](const std::vector<int>& groups) {
+    return truing::diagnosis::refit_task(work, {}, {}, both, groups).options.prior_noise;
+  };
+  CHECK(noise({0, 1}) == doctest::Approx(2.0 * std::sqrt(both.sigma2)));
+  CHECK(noise({0}) == doctest::Approx(2.0 * 0.1).epsilon(0.1));
+  CHECK(noise({1}) == doctest::Approx(2.0).epsilon(0.2));  // the first column's part of y is noise to it
+}
+
 TEST_CASE("the sentence says how sure held-out poses are") {
   Diagnosis d;
   d.verdict = Verdict::effects;
