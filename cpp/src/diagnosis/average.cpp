@@ -81,12 +81,29 @@ static double likeliest_scale(const Work& work, int links) {
   return evidence.gain(evidence.evaluate({}), columns, 0.0).scale;
 }
 
+/// Fewer than fifteen values for each parameter of the links: half as many again as where the search believes links
+/// before names. Names that it believes may still owe something to chance, and folds tell how much.
+static bool is_worth_averaging(const Work& work, int links) {
+  constexpr double kManyValues = 15.0;
+  return values_for_each(work, links) <= kManyValues;
+}
+
+/// All links under the prior that these poses speak for, and as far off as robots get.
+static std::vector<Choice> links_alone(const Work& work, int links) {
+  std::vector<Choice> out;
+  for (const double scale : std::set<double>{likeliest_scale(work, links), 1.0}) out.push_back({{links}, {scale}});
+  return out;
+}
+
 bool links_predict_alone(const Work& work) {
   constexpr double kBetter = 1.05;  // sums of squares
   const int links = all_links(work);
-  if (links < 0 || !has_few_poses(work, links)) return false;
-  const Choice alone = {{links}, {likeliest_scale(work, links)}};
-  return predicts_better(squares_of_folds(work, alone), squares_of_folds(work, {}), kBetter);
+  if (links < 0 || !is_worth_averaging(work, links)) return false;
+  const Eigen::VectorXd of_frames = squares_of_folds(work, {});
+  const std::vector<Choice> all = links_alone(work, links);
+  return std::any_of(all.begin(), all.end(), [&](const Choice& alone) {
+    return predicts_better(squares_of_folds(work, alone), of_frames, kBetter);
+  });
 }
 
 /// Some part of a fit, and the rest of links alone.
@@ -108,13 +125,11 @@ static void mix_in(const Registered& whole, const Work& work, const Robot& robot
 double average_with_links(const Registered& whole, const Work& work, const Robot& robot, const Choice& choice,
                           Identification* found) {
   const int links = all_links(work);
-  if (links < 0 || !has_few_poses(work, links)) return 1.0;
+  if (links < 0 || !is_worth_averaging(work, links)) return 1.0;
   // Links that no search found, beside nothing that a robot file can hold, count for half at most.
   const double least = choice.groups.empty() ? 0.5 : 0.0;
   Average average = {{choice}, {1.0}};
-  // Under the prior that these poses speak for, and as far off as robots get.
-  for (const double scale : std::set<double>{likeliest_scale(work, links), 1.0}) {
-    const Choice alone = {{links}, {scale}};
+  for (const Choice& alone : links_alone(work, links)) {
     const double part = std::max(stacked_part(work, average, alone), least / average.parts[0]);
     if (part >= 1.0) continue;
     mix_in(whole, work, robot, alone, part, found);

@@ -200,10 +200,14 @@ int all_links(const Work& work) {
   return at == named.end() ? -1 : static_cast<int>(at - named.begin());
 }
 
+double values_for_each(const Work& work, int group) {
+  const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(group)].columns;
+  return work.grams.train.n / static_cast<double>(columns.size());
+}
+
 bool has_few_poses(const Work& work, int links) {
-  constexpr double kManyValues = 10.0;  // for each parameter of the links
-  const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(links)].columns;
-  return work.grams.train.n <= kManyValues * static_cast<double>(columns.size());
+  constexpr double kManyValues = 10.0;
+  return values_for_each(work, links) <= kManyValues;
 }
 
 /// Angles of links are as large in milliradians as lengths are in millimetres where a robot reaches a metre; a

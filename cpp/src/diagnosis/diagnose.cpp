@@ -321,8 +321,8 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
 
 /// What is in the robot file beside what was named.
 void say_what_was_averaged(double part, Diagnosis* out) {
-  if (part == 1.0) return;
-  const auto percent = [](double of) { return number(100.0 * of, 2) + " %"; };
+  if (part > 0.995) return;
+  const auto percent = [](double of) { return number(std::round(100.0 * of), 3) + " %"; };
   out->warnings.push_back(
       out->effects.empty() ? "these poses are few: though no cause is named, the robot file has " +
                                  percent(1.0 - part) + " of all wrong links; training poses are predicted best so"

@@ -224,6 +224,8 @@ Evidence::State keep_what_predicts(const Work& work, Evidence::State state);
 
 /// The group of all links together; -1: the robot has none.
 int all_links(const Work& work);
+/// Training values for each parameter of a group.
+double values_for_each(const Work& work, int group);
 /// Fewer than ten values for each parameter of the links: what is known of every robot beforehand counts.
 bool has_few_poses(const Work& work, int links);
 /// How large angles of links are against their lengths, as the data have it.

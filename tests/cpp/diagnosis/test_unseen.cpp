@@ -127,6 +127,52 @@ TEST_CASE("the noise of a fit is what its own groups leave, whatever else was fo
   CHECK(noise({1}) == doctest::Approx(2.0).epsilon(0.2));  // the first column's part of y is noise to it
 }
 
+namespace {
+
+/// Links of few rows: most values are seen well and are right, the last six are seen badly and far off. One size of all
+/// of them has a low evidence.
+truing::diagnosis::Work some_links_far_off(unsigned seed) {
+  constexpr Eigen::Index kRows = 30, kRight = 14, kOff = 6, kLinks = kRight + kOff;
+  constexpr double kNoise = 0.1;
+  truing::diagnosis::Work work;
+  work.design.x = Eigen::MatrixXd::Ones(kRows, 1 + kLinks);
+  work.design.y = Eigen::VectorXd::Zero(kRows);
+  work.design.weight = Eigen::VectorXd::Ones(kRows);
+  work.design.prior = Eigen::VectorXd::Ones(1 + kLinks);
+  work.design.folds = 12;
+  work.design.nuisance = {0};
+  truing::math::Random random(seed);
+  for (Eigen::Index i = 0; i < kRows; ++i) {
+    for (Eigen::Index k = 1; k <= kLinks; ++k) work.design.x(i, k) = (k <= kRight ? 10.0 : 0.3) * random.normal();
+    work.design.y[i] = 0.3 + work.design.x.row(i).tail(kOff).sum() + kNoise * random.normal();
+    work.design.fold.push_back(static_cast<std::int32_t>(i % 12));
+  }
+  truing::estimation::ColumnGroup group;
+  for (int k = 1; k <= static_cast<int>(kLinks); ++k) group.columns.push_back(k);
+  work.design.candidates.groups = {group};
+  work.design.candidates.named.resize(1);
+  work.design.candidates.named[0].kind = truing::diagnosis::Explanation::Kind::all_geometry;
+  work.grams = truing::diagnosis::make_grams(work.design, 1.0, 1);
+  return work;
+}
+
+}  // namespace
+
+TEST_CASE("links predict few poses by either of the priors that are averaged") {
+  using namespace truing::diagnosis;
+  int of_evidence = 0, of_any = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Work work = some_links_far_off(seed);
+    const truing::estimation::Evidence evidence = evidence_now(work);
+    const std::vector<int>& links = work.design.candidates.groups[0].columns;
+    const double likeliest = evidence.gain(evidence.evaluate({}), links, 0.0).scale;
+    of_evidence += predicts_better(squares_of_folds(work, {{0}, {likeliest}}), squares_of_folds(work, {}), 1.05);
+    of_any += links_predict_alone(work);
+  }
+  CHECK(of_evidence <= 2);
+  CHECK(of_any >= 8);
+}
+
 TEST_CASE("the sentence says how sure held-out poses are") {
   Diagnosis d;
   d.verdict = Verdict::effects;
