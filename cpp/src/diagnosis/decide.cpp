@@ -321,7 +321,7 @@ static double share_of_shape(const Work& work, const Evidence& evidence, const E
   choice.groups.push_back(q.function);
   choice.scales.push_back(gain.scale);
   alone.state = evidence.evaluate(choice);
-  return share_of_plain_shape(work, alone, q.function, q.joint);
+  return share_of_local_shape(work, alone, q.function, q.joint);
 }
 
 /// The law that makes most of what the function and the laws at its joint make together; no group: none makes enough.

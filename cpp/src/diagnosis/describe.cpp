@@ -433,10 +433,9 @@ static std::vector<Curve> curves_of_function(const Work& work, const Decision& d
   return out;
 }
 
-double share_of_plain_shape(const Work& work, const Decision& decision, int function, std::size_t joint) {
+double share_of_local_shape(const Work& work, const Decision& decision, int function, std::size_t joint) {
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(function)];
-  const Curve curve = curve_of(work, decision, function, {e.inputs[0], work.design.joint_column[joint][0]});
-  return curve.points.size() > 3 && curve.samples.size() >= 8 ? plain_shape(curve).share : 0.0;
+  return share_of_local_shape(curve_of(work, decision, function, {e.inputs[0], work.design.joint_column[joint][0]}));
 }
 
 /// "; or its zero moves with temperature, which was not recorded": of a joint that moves as time goes on.

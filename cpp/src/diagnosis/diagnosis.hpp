@@ -346,8 +346,8 @@ double average_with_links(const Registered& whole, const Work& work, const Robot
 
 FoundEffect describe(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at,
                      const Sureness& sure, const Resampled& resampled, bool unknown, const Identification& refitted);
-/// Fraction of what a free function of one input makes at a joint, that a plain shape (a step, a corner, a bump) makes.
-double share_of_plain_shape(const Work& work, const Decision& decision, int function, std::size_t joint);
+/// Fraction of what a free function of one input makes at a joint, that a step, a corner or a bump makes.
+double share_of_local_shape(const Work& work, const Decision& decision, int function, std::size_t joint);
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at);
 /// A gap beyond the noise of repeats that nothing describes; `excess`: in standard errors.
 UnknownEffect describe_lack_of_fit(const Diagnosis& d, double excess);

@@ -353,78 +353,116 @@ double left_by(const Curve& curve, const std::vector<std::vector<double>>& colum
                   y.squaredNorm() - (x.transpose() * y).dot(solve_symmetric<Eigen::Dynamic, 1>(xx, x.transpose() * y)));
 }
 
+/// A shape fitted to a curve.
+struct FittedShape {
+  double left;  ///< sum of squares
+  double parameters;
+  std::string text;
+};
+
+template <typename Function>
+std::vector<double> values_of(const Curve& curve, const Function& f) {
+  std::vector<double> out;
+  for (const auto& sample : curve.samples) out.push_back(f(sample[0]));
+  return out;
+}
+
+/// Of a constant and of functions of the input.
+template <typename... Functions>
+double left_by_functions(const Curve& curve, const Functions&... f) {
+  return left_by(curve, {std::vector<double>(curve.samples.size(), 1.0), values_of(curve, f)...});
+}
+
+std::string with_unit(const Curve& curve, double value) {
+  return curve.input + " = " + number(value, 3) + (curve.input_unit.empty() ? "" : " " + curve.input_unit);
+}
+
+/// Steps, corners and bumps.
+std::vector<FittedShape> local_shapes(const Curve& curve) {
+  std::vector<FittedShape> out;
+  const std::size_t n = curve.samples.size(), stride = std::max<std::size_t>(1, n / 80);
+  for (std::size_t k = stride; k < n; k += stride) {
+    const double at = 0.5 * (curve.samples[k - 1][0] + curve.samples[k][0]);
+    out.push_back({left_by_functions(curve, [at](double x) { return x > at ? 1.0 : 0.0; }), 3,
+                   "a step at " + with_unit(curve, at)});
+    if (k <= 3 * stride || k + 3 * stride >= n) continue;
+    const double corner = curve.samples[k][0];
+    out.push_back({left_by_functions(curve, [corner](double x) { return std::max(0.0, x - corner); }), 3.5,
+                   "flat, then rising from " + with_unit(curve, corner)});
+    out.push_back({left_by_functions(curve, [corner](double x) { return std::abs(x - corner); }), 3.5,
+                   "a corner at " + with_unit(curve, corner)});
+  }
+  const double span = curve.samples.back()[0] - curve.samples.front()[0];
+  for (std::size_t k = 1; k + 1 < curve.points.size(); ++k) {
+    const double at = curve.points[k][0];
+    for (const double width : {0.08, 0.15, 0.25}) {
+      const auto bump = [&](double x) { return std::exp(-0.5 * std::pow((x - at) / (width * span), 2.0)); };
+      out.push_back({left_by_functions(curve, bump), 4, "a bump at " + with_unit(curve, at)});
+    }
+  }
+  return out;
+}
+
+/// Lines, parabolas and, of an angle, waves.
+std::vector<FittedShape> smooth_shapes(const Curve& curve) {
+  const auto itself = [](double x) { return x; };
+  std::vector<FittedShape> out;
+  out.push_back({left_by_functions(curve, itself), 2, "linear in " + curve.input});
+  out.push_back({left_by_functions(curve, itself, [](double x) { return x * x; }), 3, "quadratic in " + curve.input});
+  for (int k = 1; k < 8 && curve.input[0] == 'q'; ++k) {
+    const double left =
+        left_by_functions(curve, [k](double x) { return std::cos(k * x); }, [k](double x) { return std::sin(k * x); });
+    out.push_back({left, 3.5, "a wave of " + std::to_string(k) + " per turn of " + curve.input});
+  }
+  return out;
+}
+
+/// What a function with the curve's knots leaves.
+double left_by_hats(const Curve& curve) {
+  std::vector<double> knots;
+  for (const auto& point : curve.points) knots.push_back(point[0]);
+  std::vector<std::vector<double>> hats(knots.size(), std::vector<double>(curve.samples.size()));
+  std::vector<double> values(knots.size());
+  for (std::size_t i = 0; i < curve.samples.size(); ++i) {
+    hats_at(knots, curve.samples[i][0], values.data());
+    for (std::size_t k = 0; k < knots.size(); ++k) hats[k][i] = values[k];
+  }
+  return left_by(curve, hats);
+}
+
+/// The plainest of some shapes.
+struct PlainShape {
+  std::string text;
+  double share = 0.0;  ///< of what a free curve explains of the single poses' values
+};
+
+PlainShape plainest(const Curve& curve, const std::vector<FittedShape>& shapes) {
+  // What the free curve leaves is noise: chi-squared and two for each parameter (Akaike 1974).
+  const std::size_t n = curve.samples.size();
+  const double whole = left_by_functions(curve), noise = left_by_hats(curve),
+               unit2 = std::max(noise / std::max(1.0, static_cast<double>(n - std::min(n - 1, curve.points.size()))),
+                                1e-300);
+  const auto best = std::min_element(shapes.begin(), shapes.end(), [unit2](const FittedShape& a, const FittedShape& b) {
+    return a.left / unit2 + 2.0 * a.parameters < b.left / unit2 + 2.0 * b.parameters;
+  });
+  return {best->text, (whole - best->left) / std::max(whole - noise, 1e-300)};
+}
+
 }  // namespace
 
 std::string shape_of(const Curve& curve) {
   constexpr double kMost = 0.75;  ///< of what a free curve explains, that a shape must explain
   if (curve.points.size() < 2 || curve.samples.size() < 8) return "";
   if (curve.points.size() <= 3) return "different levels of " + curve.input;
-  const PlainShape best = plain_shape(curve);
+  std::vector<FittedShape> shapes = smooth_shapes(curve), local = local_shapes(curve);
+  shapes.insert(shapes.end(), local.begin(), local.end());
+  const PlainShape best = plainest(curve, shapes);
   return best.share < kMost ? "no simple shape in " + curve.input : best.text;
 }
 
-PlainShape plain_shape(const Curve& curve) {
-  const std::string unit = curve.input_unit.empty() ? "" : " " + curve.input_unit;
-  const std::size_t n = curve.samples.size();
-  const auto column = [&](const auto& f) {
-    std::vector<double> out;
-    for (const auto& sample : curve.samples) out.push_back(f(sample[0]));
-    return out;
-  };
-  const std::vector<double> one(n, 1.0);
-  const double whole = left_by(curve, {one});
-  struct Shape {
-    double left;
-    double parameters;
-    std::string text;
-  };
-  std::vector<Shape> shapes;
-  shapes.push_back({left_by(curve, {one, column([](double x) { return x; })}), 2, "linear in " + curve.input});
-  const std::size_t stride = std::max<std::size_t>(1, n / 80);
-  for (std::size_t k = stride; k < n; k += stride) {
-    const double at = 0.5 * (curve.samples[k - 1][0] + curve.samples[k][0]);
-    shapes.push_back({left_by(curve, {one, column([at](double x) { return x > at ? 1.0 : 0.0; })}), 3,
-                      "a step at " + curve.input + " = " + number(at, 3) + unit});
-    if (k > 3 * stride && k + 3 * stride < n) {
-      const double corner = curve.samples[k][0];
-      shapes.push_back({left_by(curve, {one, column([corner](double x) { return std::max(0.0, x - corner); })}), 3.5,
-                        "flat, then rising from " + curve.input + " = " + number(corner, 3) + unit});
-      shapes.push_back({left_by(curve, {one, column([corner](double x) { return std::abs(x - corner); })}), 3.5,
-                        "a corner at " + curve.input + " = " + number(corner, 3) + unit});
-    }
-  }
-  const double low = curve.samples.front()[0], span = curve.samples.back()[0] - low;
-  shapes.push_back({left_by(curve, {one, column([&](double x) { return x; }), column([&](double x) { return x * x; })}),
-                    3, "quadratic in " + curve.input});
-  for (int k = 1; k < 8 && curve.input[0] == 'q'; ++k) {
-    shapes.push_back({left_by(curve, {one, column([k](double x) { return std::cos(k * x); }),
-                                      column([k](double x) { return std::sin(k * x); })}),
-                      3.5, "a wave of " + std::to_string(k) + " per turn of " + curve.input});
-  }
-  for (std::size_t k = 1; k + 1 < curve.points.size(); ++k) {
-    for (const double width : {0.08, 0.15, 0.25}) {
-      const double at = curve.points[k][0];
-      shapes.push_back({left_by(curve, {one, column([&](double x) {
-                                          return std::exp(-0.5 * std::pow((x - at) / (width * span), 2.0));
-                                        })}),
-                        4, "a bump at " + curve.input + " = " + number(at, 3) + unit});
-    }
-  }
-  // What the free curve leaves is noise: chi-squared and two for each parameter (Akaike 1974).
-  std::vector<double> knots;
-  for (const auto& point : curve.points) knots.push_back(point[0]);
-  std::vector<std::vector<double>> hats(knots.size(), std::vector<double>(n));
-  std::vector<double> values(knots.size());
-  for (std::size_t i = 0; i < n; ++i) {
-    hats_at(knots, curve.samples[i][0], values.data());
-    for (std::size_t k = 0; k < knots.size(); ++k) hats[k][i] = values[k];
-  }
-  const double noise = left_by(curve, hats),
-               unit2 = std::max(noise / std::max(1.0, static_cast<double>(n - std::min(n - 1, knots.size()))), 1e-300);
-  const auto best = std::min_element(shapes.begin(), shapes.end(), [unit2](const Shape& a, const Shape& b) {
-    return a.left / unit2 + 2.0 * a.parameters < b.left / unit2 + 2.0 * b.parameters;
-  });
-  return {best->text, (whole - best->left) / std::max(whole - noise, 1e-300)};
+double share_of_local_shape(const Curve& curve) {
+  if (curve.points.size() <= 3 || curve.samples.size() < 8) return 0.0;
+  return plainest(curve, local_shapes(curve)).share;
 }
 
 }  // namespace truing::diagnosis

@@ -66,11 +66,8 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
 /// "a step at q4 = 0.41 rad", "linear in temp", … from points (input, value, standard error).
 std::string shape_of(const Curve& curve);
 
-/// The plainest shape of a curve of more than a few points.
-struct PlainShape {
-  std::string text;
-  double share = 0.0;  ///< of what a free curve explains of the single poses' values
-};
-PlainShape plain_shape(const Curve& curve);
+/// Of what a free curve explains of the single poses' values, the part that a step, a corner or a bump explains. Of a
+/// few points: none.
+double share_of_local_shape(const Curve& curve);
 
 }  // namespace truing::diagnosis

@@ -50,6 +50,13 @@ def test_a_law_that_makes_a_joints_function_wholly_is_named(number: int, effect:
     assert joint not in [u.joint for u in found.unknown]
 
 
+def test_a_wave_is_no_plainer_than_a_harmonic() -> None:
+    robot, data, _ = make("examination/single/10@28")
+    found = truing.diagnose(robot, data)
+    assert ("harmonic", ("A3",)) in [(e.effect, e.joints) for e in found.effects]
+    assert not found.unknown
+
+
 @pytest.mark.realdata
 @pytest.mark.filterwarnings("ignore::truing.InputWarning")
 def test_held_out_errors_that_nearly_double_are_not_explained_by_chance() -> None:
