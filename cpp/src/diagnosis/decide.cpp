@@ -130,9 +130,11 @@ Shortlist shortlist(const Work& work, const std::vector<int>& also) {
 }
 
 /// Of the motion that a law and its correction make together, the part that the plain law must make to keep its name.
-/// What a joint does with its own angle can be anything: there the bar is higher, and no plainer shape may do better,
-/// unless the law makes the function wholly.
-static double least_share_of_law(const EffectTraits& traits) { return follows_own_angle(traits) ? 0.75 : 0.65; }
+/// What a joint does with its own angle can be anything, unless it is smooth: there the bar is higher, and no plainer
+/// shape may do better, unless the law makes the function wholly.
+static double least_share_of_law(const EffectTraits& traits, bool smooth) {
+  return follows_own_angle(traits) && !smooth ? 0.75 : 0.65;
+}
 
 static std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
   std::vector<int> out;
@@ -324,6 +326,13 @@ static double share_of_shape(const Work& work, const Evidence& evidence, const E
   return share_of_local_shape(work, alone, q.function, q.joint);
 }
 
+/// The function is one of the joint's own angle, and turns it in waves.
+static bool is_smooth_turn(const Work& work, const Evidence& evidence, const Evidence::State& rest, const Question& q) {
+  const int angle = input_named(work, input_name(Driver::angle, q.joint));
+  return q.what.inputs == std::vector<int>{angle} && q.what.law_test == LawTest::of_driver &&
+         is_smooth(work, evidence, rest, q.joint, angle);
+}
+
 /// The law that makes most of what the function and the laws at its joint make together; no group: none makes enough.
 static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence, const Choice& choice,
                                       const Question& q) {
@@ -332,6 +341,7 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
   const Evidence::State rest = evidence.evaluate(without_these(choice, q.here));
   const double of_shape = share_of_shape(work, evidence, rest, q);
   const bool of_angle = q.what.inputs[0] == input_named(work, input_name(Driver::angle, q.joint));
+  const bool smooth = is_smooth_turn(work, evidence, rest, q);
   const double together = rest.rss - evidence.evaluate(choice).rss;
   Evidence::Gain best;
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -343,9 +353,9 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
     const Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
     const double share = gain.squares / std::max(together, 1e-300);
     const EffectTraits& traits = effect_traits(work, e);
-    const bool plainer =
-        (of_angle ? follows_configuration(traits) : follows_own_angle(traits)) && share < kWholly && of_shape > kWholly;
-    if (!plainer && share > least_share_of_law(traits) && gain.score > best.score) {
+    const bool is_of_it = of_angle ? follows_configuration(traits) : follows_own_angle(traits);
+    const bool plainer = is_of_it && !smooth && share < kWholly && of_shape > kWholly;
+    if (!plainer && share > least_share_of_law(traits, smooth) && gain.score > best.score) {
       best = gain;
       best.group = static_cast<int>(g);
     }

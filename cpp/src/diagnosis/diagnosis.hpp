@@ -296,6 +296,9 @@ void question_bundles(Work* work, const Robot& robot, Decision* decision);
 /// What the best of them would win at a joint along an input [nats], less what having scanned all of them costs.
 double best_local_shape(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
                         int input);
+/// Does a joint that moves with its own angle turn in waves? Then those of the first three orders are likelier than any
+/// function with knots, a step, a corner or a bump.
+bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int angle);
 
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 

@@ -46,42 +46,91 @@ std::vector<Shape> shapes_of(const std::vector<double>& places) {
   return out;
 }
 
+/// A joint that moves as a function of an input beside a state, on the rows that are looked at.
+class Beside {
+ public:
+  Beside(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int input)
+      : along_(work.inputs[static_cast<std::size_t>(input)]),
+        evidence_(evidence),
+        left_(what_is_left(work.design, state, kValuesSeen)),
+        times_(1.0 / (left_.share * work.noise.design_effect)),
+        seen_(seen_on(left_, evidence, state, times_)),
+        motion_(left_.residual.size()) {
+    for (const Eigen::Index i : left_.at) {
+      const std::int32_t row = work.design.row[static_cast<std::size_t>(i)];
+      const auto n = static_cast<Eigen::Index>(x_.size());
+      motion_[n] = work.design.weight[i] * work.design.x(i, work.design.joint_column[joint][0]);
+      x_.push_back(along_.values[static_cast<std::size_t>(row)]);
+      if (rows_.empty() || rows_.back() != row) rows_.push_back(row);
+    }
+  }
+
+  std::vector<double> knots(int most) const { return knots_of(along_, rows_, most); }
+
+  /// What the function wins [nats]: `count` parameters times as many values, which `values` finds at an input.
+  template <typename Values>
+  double evidence_of(std::size_t count, const Values& values) const {
+    const auto p = static_cast<Eigen::Index>(count);
+    Eigen::MatrixXd columns(motion_.size(), p);
+    Eigen::VectorXd at(p);
+    for (Eigen::Index n = 0; n < motion_.size(); ++n) {
+      values(x_[static_cast<std::size_t>(n)], at.data());
+      columns.row(n) = motion_[n] * at;
+    }
+    const Eigen::MatrixXd half = left_.factor.matrixL().solve(left_.columns.transpose() * columns);
+    Eigen::MatrixXd a = columns.transpose() * columns;
+    const Eigen::VectorXd own = 1e-9 * a.diagonal();
+    a -= half.transpose() * half;
+    a.diagonal() += own;
+    const Eigen::VectorXd b = columns.transpose() * left_.residual;
+    return evidence_.gain_of(seen_, times_ * a, times_ * b, Eigen::VectorXd::Constant(p, kLargest), 0.0).evidence;
+  }
+
+  double evidence_of_knots(int most) const {
+    const std::vector<double> knots = this->knots(most);
+    return evidence_of(knots.size(), [&](double x, double* out) { hats_at(knots, x, out); });
+  }
+
+ private:
+  const InputColumn& along_;
+  const Evidence& evidence_;
+  const Left left_;
+  const double times_;
+  const Evidence::State seen_;
+  Eigen::VectorXd motion_;  // of the tip by the joint, weighted
+  std::vector<double> x_;
+  std::vector<std::int32_t> rows_;
+};
+
+double best_shape(const Beside& beside) {
+  const std::vector<double> places = beside.knots(kPlaces);
+  if (places.size() < 5) return -1e300;  // levels, not a curve
+  const std::vector<Shape> shapes = shapes_of(places);
+  double best = -1e300;
+  for (const Shape& shape : shapes)
+    best = std::max(best, beside.evidence_of(1, [&](double x, double* out) { *out = shape.at(x); }));
+  return best - std::log(static_cast<double>(shapes.size()));
+}
+
 }  // namespace
 
 double best_local_shape(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
                         int input) {
-  const Design& design = work.design;
-  const InputColumn& along = work.inputs[static_cast<std::size_t>(input)];
-  const Left left = what_is_left(design, state, kValuesSeen);
-  std::vector<std::int32_t> rows;
-  for (const Eigen::Index i : left.at) {
-    const std::int32_t row = design.row[static_cast<std::size_t>(i)];
-    if (rows.empty() || rows.back() != row) rows.push_back(row);
-  }
-  const std::vector<double> places = knots_of(along, rows, kPlaces);
-  if (places.size() < 5) return -1e300;  // levels, not a curve
-  const std::vector<Shape> shapes = shapes_of(places);
-  const double times = 1.0 / (left.share * work.noise.design_effect),
-               cost = std::log(static_cast<double>(shapes.size()));
-  const Evidence::State seen = seen_on(left, evidence, state, times);
-  Eigen::VectorXd motion(left.residual.size()), column(left.residual.size());
-  for (Eigen::Index n = 0; n < motion.size(); ++n) {
-    const Eigen::Index i = left.at[static_cast<std::size_t>(n)];
-    motion[n] = design.weight[i] * design.x(i, design.joint_column[joint][0]);
-  }
-  double best = -1e300;
-  for (const Shape& shape : shapes) {
-    for (Eigen::Index n = 0; n < column.size(); ++n) {
-      const std::int32_t row = design.row[static_cast<std::size_t>(left.at[static_cast<std::size_t>(n)])];
-      column[n] = motion[n] * shape.at(along.values[static_cast<std::size_t>(row)]);
+  return best_shape(Beside(work, evidence, state, joint, input));
+}
+
+bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int angle) {
+  constexpr int kOrder = 3, kKnots = 8, kFineKnots = 16;
+  const Beside beside(work, evidence, state, joint, angle);
+  const double by_waves = beside.evidence_of(1 + 2 * kOrder, [](double q, double* out) {
+    *out++ = 1.0;
+    for (int k = 1; k <= kOrder; ++k) {
+      *out++ = std::cos(k * q);
+      *out++ = std::sin(k * q);
     }
-    const Eigen::VectorXd half = left.factor.matrixL().solve(left.columns.transpose() * column);
-    const double own = column.squaredNorm();
-    const Eigen::MatrixXd a = Eigen::MatrixXd::Constant(1, 1, std::max(own - half.squaredNorm(), 1e-9 * own) * times);
-    const Eigen::VectorXd b = Eigen::VectorXd::Constant(1, column.dot(left.residual) * times);
-    best = std::max(best, evidence.gain_of(seen, a, b, Eigen::VectorXd::Constant(1, kLargest), cost).score);
-  }
-  return best;
+  });
+  return by_waves > beside.evidence_of_knots(kKnots) && by_waves > beside.evidence_of_knots(kFineKnots) &&
+         by_waves > best_shape(beside);
 }
 
 }  // namespace truing::diagnosis

@@ -57,6 +57,14 @@ def test_a_wave_is_no_plainer_than_a_harmonic() -> None:
     assert not found.unknown
 
 
+@pytest.mark.parametrize(("which", "joint"), [("wrong_law/11@28", "J4"), ("wrong_law/11@9802", "J4")])
+def test_gears_that_err_three_times_per_turn_as_well_are_a_harmonic(which: str, joint: str) -> None:
+    """Which makes about 74 % of what the joint does with its angle."""
+    robot, data, _ = make(f"examination/{which}")
+    found = truing.diagnose(robot, data)
+    assert ("harmonic", (joint,)) in [(e.effect, e.joints) for e in found.effects]
+
+
 @pytest.mark.realdata
 @pytest.mark.filterwarnings("ignore::truing.InputWarning")
 def test_held_out_errors_that_nearly_double_are_not_explained_by_chance() -> None:
