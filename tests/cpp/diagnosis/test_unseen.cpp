@@ -133,7 +133,7 @@ namespace {
 /// of them has a low evidence.
 truing::diagnosis::Work some_links_far_off(unsigned seed) {
   constexpr Eigen::Index kRows = 30, kRight = 14, kOff = 6, kLinks = kRight + kOff;
-  constexpr double kNoise = 0.1;
+  constexpr double kScatter = 0.1;
   truing::diagnosis::Work work;
   work.design.x = Eigen::MatrixXd::Ones(kRows, 1 + kLinks);
   work.design.y = Eigen::VectorXd::Zero(kRows);
@@ -144,7 +144,7 @@ truing::diagnosis::Work some_links_far_off(unsigned seed) {
   truing::math::Random random(seed);
   for (Eigen::Index i = 0; i < kRows; ++i) {
     for (Eigen::Index k = 1; k <= kLinks; ++k) work.design.x(i, k) = (k <= kRight ? 10.0 : 0.3) * random.normal();
-    work.design.y[i] = 0.3 + work.design.x.row(i).tail(kOff).sum() + kNoise * random.normal();
+    work.design.y[i] = 0.3 + work.design.x.row(i).tail(kOff).sum() + kScatter * random.normal();
     work.design.fold.push_back(static_cast<std::int32_t>(i % 12));
   }
   truing::estimation::ColumnGroup group;
