@@ -274,6 +274,7 @@ TEST_CASE("where the rows see every link, or somebody knows more of them, nothin
   IdentifyOptions options;
   const Identification found = truing::identify(seen.nominal, seen.table->data, options);
   CHECK(found.shrunk_to == 0.0);
+  CHECK(truing::identify(hardly.nominal, hardly.table->data, options).shrunk_to > 0.0);
   options.priors = {{"J5.theta", 1e-2}};
   CHECK(truing::identify(hardly.nominal, hardly.table->data, options).shrunk_to == 0.0);
   options.shrink_beyond = 0.0;
