@@ -65,29 +65,28 @@ Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen
 }
 
 /// The fit anew, its links near the nominal robot: under a prior of a size that the rows choose, until it stays. Gives
-/// the size; 0, and leaves the fit: the rows say that the nominal robot tells nothing.
+/// the size; 0 where they are farther off than robots are: the nominal robot tells nothing of them then but where to
+/// start from, so that of hollows alike the near one is found.
 double shrink(const Job& job, const Eigen::VectorXd& start, std::vector<std::vector<double>>* bases, Fit* found) {
-  constexpr double kFirst = 0.01;  // [rad, m]
+  constexpr double kFirst = 0.01, kFarOff = 0.1;  // [rad, m]
   constexpr int kRounds = 5;
-  const Fit free = *found;
-  const std::vector<std::vector<double>> bases_of_free = *bases;
+  const std::vector<int> fitted = found->fitted, links = links_of(job.model, fitted);
   IdentifyOptions options = job.options;
-  options.prior_noise = noise_of(job, free);
+  options.prior_noise = noise_of(job, *found);
   const Job near_nominal{job.model, job.data, job.bases, options, job.rows};
-  const std::vector<int> links = links_of(job.model, free.fitted);
   double size = 0.0, next = kFirst;
   for (int round = 0; round < kRounds && next != size; ++round) {
     size = next;
-    for (const int k : links) options.priors[job.model.parameters[free.fitted[k]].name] = size;
+    for (const int k : links) options.priors[job.model.parameters[fitted[k]].name] = size;
     *bases = make_bases(job.model, job.data);
-    *found = fit_with_gravity(near_nominal, free.fitted, start, bases);
+    *found = fit_with_gravity(near_nominal, fitted, start, bases);
     next = likeliest_error(near_nominal, *found, links);
-    if (std::isfinite(next)) continue;
-    *found = free;
-    *bases = bases_of_free;
-    return 0.0;
   }
-  return size;
+  if (size <= kFarOff) return size;
+  *bases = make_bases(job.model, job.data);
+  *found = fit_with_gravity(job, fitted, Eigen::VectorXd(found->values), bases);
+  unwind(job.model, links, found);
+  return 0.0;
 }
 
 }  // namespace

@@ -44,16 +44,40 @@ static Gram sums_about_nominal(const Job& job, const Fit& found, const std::vect
 }
 
 double likeliest_error(const Job& job, const Fit& found, const std::vector<int>& links) {
-  constexpr double kLargest = 0.1;  // [rad, m]
   const Gram sums = sums_about_nominal(job, found, links);
   std::vector<int> others;
   for (int k = 0; k < sums.xx.rows(); ++k) {
     if (std::find(links.begin(), links.end(), k) == links.end()) others.push_back(k);
   }
-  const std::vector<ColumnGroup> none;
-  const Evidence evidence(sums, none, others, Eigen::VectorXd::Constant(sums.xx.rows(), kLargest));
-  const double size = kLargest * evidence.gain(evidence.evaluate({}), links, 0.0).scale;
-  return size < kLargest ? size : kInfinity;
+  const auto likeliest_up_to = [&](double largest) {  // among its parts
+    const std::vector<ColumnGroup> none;
+    const Evidence evidence(sums, none, others, Eigen::VectorXd::Constant(sums.xx.rows(), largest));
+    return largest * evidence.gain(evidence.evaluate({}), links, 0.0).scale;
+  };
+  constexpr double kUsual = 0.1, kLargest = 1.0;  // [rad, m]
+  const double size = likeliest_up_to(kUsual);
+  return size < kUsual ? size : likeliest_up_to(kLargest);
+}
+
+/// Whether a turn of the parameter turns everything it moves by whole turns.
+static bool is_cyclic(const ParameterInfo& parameter) {
+  if (parameter.unit != "rad") return false;
+  return std::all_of(parameter.columns.begin(), parameter.columns.end(), [](const ColumnTerm& column) {
+    return column.reading < 0 && column.term < 0 &&
+           std::all_of(
+               column.sites.begin(), column.sites.end(),
+               [](const SiteWeight& site) { return site.second == std::round(site.second); });
+  });
+}
+
+void unwind(const Model& model, const std::vector<int>& links, Fit* found) {
+  const Eigen::VectorXd nominal = initial_values(model);
+  for (const int k : links) {
+    const int parameter = found->fitted[k];
+    if (!is_cyclic(model.parameters[parameter])) continue;
+    double& value = found->values[parameter];
+    value -= math::kTwoPi * std::round((value - nominal[parameter]) / math::kTwoPi);
+  }
 }
 
 }  // namespace truing::identification
