@@ -65,10 +65,10 @@ Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen
 }
 
 /// The fit anew, its links near the nominal robot: under a prior of a size that the rows choose, until it stays. Gives
-/// the size; 0 where they are farther off than robots are: the nominal robot tells nothing of them then but where to
-/// start from, so that of hollows alike the near one is found.
+/// the size. Where links are farther off than robots are, the nominal robot tells nothing of them but where to start
+/// from: the fit is free, in one of the hollows that are near.
 double shrink(const Job& job, const Eigen::VectorXd& start, std::vector<std::vector<double>>* bases, Fit* found) {
-  constexpr double kFirst = 0.01, kFarOff = 0.1;  // [rad, m]
+  constexpr double kFirst = 0.01;  // [rad, m]
   constexpr int kRounds = 5;
   const std::vector<int> fitted = found->fitted, links = links_of(job.model, fitted);
   IdentifyOptions options = job.options;
@@ -86,7 +86,7 @@ double shrink(const Job& job, const Eigen::VectorXd& start, std::vector<std::vec
   *bases = make_bases(job.model, job.data);
   *found = fit_with_gravity(job, fitted, Eigen::VectorXd(found->values), bases);
   unwind(job.model, links, found);
-  return 0.0;
+  return size;
 }
 
 }  // namespace
@@ -113,10 +113,10 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   const Seen seen = what_is_seen(job, asked, start.values);
   Fit found = fit_with_gravity(job, seen.selection.fitted, start.values, &bases);
   Uncertainty known = uncertainty(job, found, rows.pose, asked.content.poses);
-  double shrunk_to = 0.0;
+  double off = 0.0;  // about as far as links are; 0: nobody asks
   if (options.priors.empty() && options.bounds.empty() &&
       barely_seen(links_of(model, found.fitted), known.covariance, options.shrink_beyond)) {
-    shrunk_to = shrink(job, start.values, &bases, &found);
+    off = shrink(job, start.values, &bases, &found);
     known = uncertainty(job, found, rows.pose, asked.content.poses);
   }
 
@@ -130,13 +130,17 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   result.rank = static_cast<int>(seen.selection.fitted.size());
   result.columns = static_cast<int>(seen.free.size()) + (seen.scale_carrier >= 0 ? 1 : 0);
   for (const std::int32_t row : found.rejected) result.rejected_rows.push_back(static_cast<std::size_t>(row));
-  result.shrunk_to = shrunk_to;
+  if (off <= kFarOff) result.shrunk_to = off;
   result.covariance = known.covariance;
   result.noise_sigma = known.noise;
   result.rotation_noise_sigma = known.rotation_noise;
   report_parameters(nominal_model, model, seen, found, &result);
   report_errors(job, asked.content, rows.test, start.values, found, &result);
   result.warnings = make_warnings(result, asked.values, spread_of(job, found.rejected));
+  if (off > kFarOff)
+    result.warnings.push_back(
+        "the rows hardly see some links, and speak for links farther off than robots are: robots of other values may "
+        "fit them as well, and standard errors are about this one");
   return result;
 }
 

@@ -54,9 +54,9 @@ double likeliest_error(const Job& job, const Fit& found, const std::vector<int>&
     const Evidence evidence(sums, none, others, Eigen::VectorXd::Constant(sums.xx.rows(), largest));
     return largest * evidence.gain(evidence.evaluate({}), links, 0.0).scale;
   };
-  constexpr double kUsual = 0.1, kLargest = 1.0;  // [rad, m]
-  const double size = likeliest_up_to(kUsual);
-  return size < kUsual ? size : likeliest_up_to(kLargest);
+  constexpr double kLargest = 1.0;  // [rad, m]
+  const double size = likeliest_up_to(kFarOff);
+  return size < kFarOff ? size : likeliest_up_to(kLargest);
 }
 
 /// Whether a turn of the parameter turns everything it moves by whole turns.

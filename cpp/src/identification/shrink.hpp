@@ -20,6 +20,8 @@ std::vector<int> links_of(const Model& model, const std::vector<int>& fitted);
 /// Whether the rows know one of these links only to more than `beyond` [rad, m].
 bool barely_seen(const std::vector<int>& links, const Eigen::MatrixXd& covariance, double beyond);
 
+constexpr double kFarOff = 0.1;  ///< [rad, m] farther off than links of robots are
+
 /// Standard deviation of the links about the nominal robot [rad, m] that the rows speak for, where a fit stands: from
 /// 0.1 mrad, mm to a rad, m.
 double likeliest_error(const Job& job, const Fit& found, const std::vector<int>& links);

@@ -271,6 +271,7 @@ TEST_CASE("links that are farther off than robots are are fitted freely, from ne
     }
     const Identification found = truing::identify(other, c.table->data);
     CHECK(found.shrunk_to == 0.0);
+    CHECK(contains(found.warnings.back(), "robots of other values may fit them as well"));
     CHECK(found.test->after.rms < 3e-4);
     for (const truing::Parameter& p : found.parameters) {
       if (!p.frozen && p.name[0] == 'J') CHECK(std::abs(p.value - p.nominal) < 3.2);  // less than half a turn
