@@ -88,10 +88,53 @@ static bool is_worth_averaging(const Work& work, int links) {
   return values_for_each(work, links) <= kManyValues;
 }
 
-/// All links under the prior that these poses speak for, and as far off as robots get.
-static std::vector<Choice> links_alone(const Work& work, int links) {
-  std::vector<Choice> out;
-  for (const double scale : std::set<double>{likeliest_scale(work, links), 1.0}) out.push_back({{links}, {scale}});
+/// Links' columns that training poses see: beside the prior that they speak for, less than half of its variance is
+/// left.
+static std::vector<bool> are_seen(const Work& work, const Choice& links, const std::vector<int>& columns) {
+  constexpr double kLeft = 0.5;
+  const Evidence evidence = evidence_now(work);
+  const Evidence::State state = evidence.evaluate(links);
+  std::vector<bool> out;
+  for (const int column : columns) {
+    const auto at = std::find(state.columns.begin(), state.columns.end(), column) - state.columns.begin();
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(static_cast<Eigen::Index>(state.columns.size()), at);
+    out.push_back(state.precision[at] * state.factor.solve(unit)[at] < kLeft);
+  }
+  return out;
+}
+
+/// Links that training poses see, and those that they do not, as two groups more; numbers of them.
+struct PartedLinks {
+  Work work;
+  double likeliest = 1.0;
+  int seen = -1, unseen = -1;
+};
+
+static PartedLinks with_links_parted(const Work& work, int links) {
+  PartedLinks out{work, likeliest_scale(work, links)};
+  Candidates& candidates = out.work.design.candidates;
+  const ColumnGroup all = candidates.groups[static_cast<std::size_t>(links)];
+  const Explanation what = candidates.named[static_cast<std::size_t>(links)];
+  const std::vector<bool> seen = are_seen(work, {{links}, {out.likeliest}}, all.columns);
+  const auto add = [&](bool those) {
+    ColumnGroup part = all;
+    part.columns.clear();
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      if (seen[k] == those) part.columns.push_back(all.columns[k]);
+    }
+    candidates.groups.push_back(std::move(part));
+    candidates.named.push_back(what);
+    return static_cast<int>(candidates.groups.size()) - 1;
+  };
+  out.seen = add(true);
+  out.unseen = add(false);
+  return out;
+}
+
+/// All links under the prior that these poses speak for, and those that they see as far off as robots get.
+static std::vector<Choice> links_alone(const PartedLinks& parted, int links) {
+  std::vector<Choice> out = {{{links}, {parted.likeliest}}};
+  if (parted.likeliest < 1.0) out.push_back({{parted.seen, parted.unseen}, {1.0, parted.likeliest}});
   return out;
 }
 
@@ -99,10 +142,11 @@ bool links_predict_alone(const Work& work) {
   constexpr double kBetter = 1.05;  // sums of squares
   const int links = all_links(work);
   if (links < 0 || !is_worth_averaging(work, links)) return false;
+  const PartedLinks parted = with_links_parted(work, links);
   const Eigen::VectorXd of_frames = squares_of_folds(work, {});
-  const std::vector<Choice> all = links_alone(work, links);
+  const std::vector<Choice> all = links_alone(parted, links);
   return std::any_of(all.begin(), all.end(), [&](const Choice& alone) {
-    return predicts_better(squares_of_folds(work, alone), of_frames, kBetter);
+    return predicts_better(squares_of_folds(parted.work, alone), of_frames, kBetter);
   });
 }
 
@@ -128,11 +172,12 @@ double average_with_links(const Registered& whole, const Work& work, const Robot
   if (links < 0 || !is_worth_averaging(work, links)) return 1.0;
   // Links that no search found, beside nothing that a robot file can hold, count for half at most.
   const double least = choice.groups.empty() ? 0.5 : 0.0;
+  const PartedLinks parted = with_links_parted(work, links);
   Average average = {{choice}, {1.0}};
-  for (const Choice& alone : links_alone(work, links)) {
-    const double part = std::max(stacked_part(work, average, alone), least / average.parts[0]);
+  for (const Choice& alone : links_alone(parted, links)) {
+    const double part = std::max(stacked_part(parted.work, average, alone), least / average.parts[0]);
     if (part >= 1.0) continue;
-    mix_in(whole, work, robot, alone, part, found);
+    mix_in(whole, parted.work, robot, alone, part, found);
     for (double& of : average.parts) of *= part;
     average.of.push_back(alone);
     average.parts.push_back(1.0 - part);

@@ -445,6 +445,22 @@ def test_of_25_poses_that_are_too_few_it_is_said_what_they_can_answer() -> None:
     assert float(shown) == pytest.approx(1e3 * max(d.size_at_tip for d in small), rel=0.01)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_links_that_few_poses_do_not_see_stay_about_nominal(seed: int) -> None:
+    nominal = truing.load_robot(example("ur10"))
+    rng = np.random.default_rng(seed)
+    joints = rng.uniform(-1.5, 1.5, (25, 6))
+    joints[:, 4:] = 0.4 + rng.uniform(-0.02, 0.02, (25, 2))  # the wrist hardly moves
+    real = truing.simulate(nominal, joints=joints, noise=3e-4, seed=seed)
+    fresh = truing.simulate(nominal, joints=rng.uniform(-1.5, 1.5, (200, 6)), noise=1e-9, seed=seed).data
+    found = truing.diagnose(nominal, real.data)
+
+    def left_by(robot: truing.Robot) -> float:
+        return float(np.sqrt(np.mean(truing.residuals(robot, fresh).position ** 2)))
+
+    assert found.verdict == "effects" and left_by(found.robot) < left_by(found.robot_before)
+
+
 @pytest.mark.parametrize(
     ("joint", "place", "size", "seed"), [(4, -0.2269, 1.777e-4, 2), (3, -0.1176, 1.971e-4, 4)]
 )
