@@ -131,10 +131,15 @@ static PartedLinks with_links_parted(const Work& work, int links) {
   return out;
 }
 
-/// All links under the prior that these poses speak for, and those that they see as far off as robots get.
+/// All links under the prior that these poses speak for; and as far off as robots get, those that they see, or all
+/// where folds are predicted better so.
 static std::vector<Choice> links_alone(const PartedLinks& parted, int links) {
+  constexpr double kBetter = 1.05;  // sums of squares
   std::vector<Choice> out = {{{links}, {parted.likeliest}}};
-  if (parted.likeliest < 1.0) out.push_back({{parted.seen, parted.unseen}, {1.0, parted.likeliest}});
+  if (parted.likeliest == 1.0) return out;
+  const Choice all = {{links}, {1.0}}, seen = {{parted.seen, parted.unseen}, {1.0, parted.likeliest}};
+  const auto squares = [&](const Choice& choice) { return squares_of_folds(parted.work, choice); };
+  out.push_back(predicts_better(squares(all), squares(seen), kBetter) ? all : seen);
   return out;
 }
 
