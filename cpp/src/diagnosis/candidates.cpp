@@ -392,6 +392,12 @@ class Builder {
         }
       }
     }
+    for (const std::vector<Effect>* effects : {&catalogue(), &task_.options.own_effects}) {
+      for (const Effect& effect : *effects) {
+        const bool of_lengths = effect.traits.law_test == LawTest::times_the_lengths;
+        if (of_lengths && effect.terms_of_robot && is_searched(effect)) add_law_test_of_robot(effect);
+      }
+    }
   }
 
   /// The input that the correction of a law is a function of.
@@ -399,8 +405,9 @@ class Builder {
     switch (traits.law_test) {
       case LawTest::times_direction:
         return input_name(knows_mass(task_.at) ? Driver::gravity_torque : Driver::angle, joint);
-      case LawTest::times_the_lengths:
-        return input_index("time") >= 0 ? "time" : "temp";
+      case LawTest::times_the_lengths:  // warmth lags behind the sensor: a function of time, not of the temperature
+        if (input_index("temp") < 0 || time_index() < 0) return "time";
+        return task_.inputs[static_cast<std::size_t>(time_index())].name;
       default:
         return input_name(traits.driver, joint);
     }
@@ -408,13 +415,22 @@ class Builder {
 
   void add_law_test(const Effect& effect, std::size_t joint) {
     Explanation e;
+    e.joints = {task_.at.joints[joint].name};
+    e.site = e.joints[0];
+    add_correction(effect, joint, std::move(e));
+  }
+
+  /// All links by one function. The law of the robot as a whole has no number (ColumnGroup::law_at): this is no
+  /// candidate, and is only compared with what that law leaves (departures_from_laws).
+  void add_law_test_of_robot(const Effect& effect) { add_correction(effect, task_.at.joints.size(), {}); }
+
+  /// `joint`: one past the last for the robot as a whole.
+  void add_correction(const Effect& effect, std::size_t joint, Explanation e) {
     e.driver = input_of_law_test(effect.traits, joint);
     const int at = input_index(e.driver);
     if (at < 0 || task_.inputs[static_cast<std::size_t>(at)].constant) return;
     e.kind = Explanation::Kind::law;
     e.effect = effect.name;
-    e.joints = {task_.at.joints[joint].name};
-    e.site = e.joints[0];
     e.inputs = {at};
     e.law_test = effect.traits.law_test;
     e.knots = {knots_of(task_.inputs[static_cast<std::size_t>(at)], task_.rows,

@@ -136,7 +136,7 @@ static double least_share_of_law(const EffectTraits& traits, bool smooth) {
   return follows_own_angle(traits) && !smooth ? 0.75 : 0.65;
 }
 
-static std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
+std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
   std::vector<int> out;
   for (const int g : groups) {
     const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;

@@ -199,80 +199,94 @@ static bool is_law(const Work& work, const Explanation& e) {
 }
 
 /// What a law of the temperature leaves where nothing is as warm as the sensor says: its motion, as any function of
-/// time. Log Bayes factor beside `rest`, at most.
+/// time, of a link that it names or of all of them alike. Log Bayes factor beside `rest`, at most.
 static double as_lagging_warmth(const Work& work, const Evidence& evidence, const Evidence::State& rest,
                                 const Explanation& law, const std::vector<int>& time) {
   const auto& groups = work.design.candidates.groups;
-  const auto is_of_law = [&](const std::string& joint) {
-    return law.joints.empty() || std::find(law.joints.begin(), law.joints.end(), joint) != law.joints.end();
-  };
   double best = -1e300;
-  std::vector<int> of_all_links;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = work.design.candidates.named[g];
-    if (e.kind != Kind::law || e.effect != law.effect || !is_of_law(e.site) || groups[g].columns.empty()) continue;
-    best = std::max(best, evidence.gain(rest, groups[g].columns, 0.0).evidence);
-    of_all_links.insert(of_all_links.end(), groups[g].columns.begin(), groups[g].columns.end());
+    const bool is_of_law =
+        e.kind == Kind::law && e.effect == law.effect && (law.joints.empty() || e.joints == law.joints);
+    if (is_of_law && !groups[g].columns.empty())
+      best = std::max(best, evidence.gain(rest, groups[g].columns, 0.0).evidence);
   }
-  if (law.joints.empty() && !of_all_links.empty())
-    best = std::max(best, evidence.gain(rest, of_all_links, 0.0).evidence);
+  if (time.empty()) return best;
   FreeScanOptions of_time;
   of_time.flips = 0;
   of_time.only_of = time;
   const Robot& robot = work.given.frames.robot;
   for (const FreeGain& found :
        scan_free(work.design, evidence, rest, work.inputs, robot, work.noise.design_effect, of_time).best) {
-    if (is_of_law(found.what.site)) best = std::max(best, found.gain.evidence);
+    const bool is_of_law =
+        law.joints.empty() || std::find(law.joints.begin(), law.joints.end(), found.what.site) != law.joints.end();
+    if (is_of_law) best = std::max(best, found.gain.evidence);
   }
   return best;
 }
 
-/// Does the frame wander in a way that lagging warmth of the parts that a law of the temperature names does not make?
-static bool wanders_by_itself(const Work& work, const Evidence& evidence, const Decision& decision, int drift,
-                              const Explanation& law) {
-  const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, {drift}));
-  const ColumnGroup& frame = work.design.candidates.groups[static_cast<std::size_t>(drift)];
-  const double by_frame = evidence.gain(rest, frame.columns, 0.0).evidence;
-  const std::vector<int>& time = work.design.candidates.named[static_cast<std::size_t>(drift)].inputs;
-  return by_frame > as_lagging_warmth(work, evidence, rest, law, time) + decision.search.threshold;
+/// Do these names make a motion that lagging warmth of the parts that a law of the temperature names does not make?
+static bool stand_by_themselves(const Work& work, const Evidence& evidence, const Decision& decision,
+                                const std::vector<int>& names, const Explanation& law) {
+  const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, names));
+  std::vector<int> time;
+  for (const int g : names) {
+    const std::vector<int>& inputs = work.design.candidates.named[static_cast<std::size_t>(g)].inputs;
+    time.insert(time.end(), inputs.begin(), inputs.end());
+  }
+  const double by_names = evidence.gain(rest, columns_of(work, names), 0.0).evidence;
+  return by_names > as_lagging_warmth(work, evidence, rest, law, time) + decision.search.threshold;
+}
+
+/// What lagging warmth looks like: its base wanders; where all lengths grow, the metre is wrong.
+static bool may_be_warmth(const Work& work, const Explanation& small, const Explanation& large) {
+  const EffectTraits &one = effect_traits(work, small), &other = effect_traits(work, large);
+  if (other.driver != Driver::temperature || one.driver == Driver::temperature) return false;
+  return one.driver == Driver::time || (looks_like_geometry(work, small) && looks_like_geometry(work, large));
 }
 
 /// Laws are seldom exact, and what one leaves looks like another one: the joint was not set to zero where the law says;
-/// where both go with the joint's own angle, little is left; what is warm is not as warm as the sensor says, and the
-/// frame seems to wander.
+/// where both go with the joint's own angle, little is left.
 static bool is_departure(const Work& work, const Explanation& small, const Explanation& large, double ratio) {
   constexpr double kLittle = 0.3;  ///< of the larger law's motion of the tip
   const EffectTraits &one = effect_traits(work, small), &other = effect_traits(work, large);
-  if (ratio >= 1.0 || same_name(small, large)) return false;
-  if (one.driver == Driver::time) return other.driver == Driver::temperature;
-  if (small.joints != large.joints) return false;
+  if (same_name(small, large) || small.joints != large.joints) return false;
   if (one.driver == Driver::constant && one.moves == other.moves) return true;
   return follows_own_angle(one) && follows_own_angle(other) && ratio < kLittle;
 }
 
+/// Of the names that may be what a law of the temperature leaves: those that are. They are asked together first, for
+/// each makes up for what the others lack.
+static std::vector<int> left_by_warmth(const Work& work, const Evidence& evidence, const Decision& decision,
+                                       const std::vector<int>& names, const Explanation& law) {
+  if (names.empty() || !stand_by_themselves(work, evidence, decision, names, law)) return names;
+  std::vector<int> out;
+  for (const int g : names) {
+    if (!stand_by_themselves(work, evidence, decision, {g}, law)) out.push_back(g);
+  }
+  return out;
+}
+
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision) {
+  const auto named = [&](int g) -> const Explanation& {
+    return work.design.candidates.named[static_cast<std::size_t>(g)];
+  };
   std::vector<std::pair<double, int>> laws;  // the largest first
   for (const int g : decision.state.choice.groups) {
-    if (!is_law(work, work.design.candidates.named[static_cast<std::size_t>(g)])) continue;
-    const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;
-    laws.emplace_back(size_at_tip(work, decision.state, columns), g);
+    if (is_law(work, named(g))) laws.emplace_back(size_at_tip(work, decision.state, columns_of(work, {g})), g);
   }
   std::sort(laws.rbegin(), laws.rend());
   std::map<int, int> out;
-  for (std::size_t small = 1; small < laws.size(); ++small) {
-    for (std::size_t large = 0; large < small; ++large) {
-      const auto [size, group] = laws[large];
-      if (out.count(group) || out.count(laws[small].second) || !(size > 0.0)) continue;
-      const auto named = [&](int g) -> const Explanation& {
-        return work.design.candidates.named[static_cast<std::size_t>(g)];
-      };
-      const int less = laws[small].second;
-      if (!is_departure(work, named(less), named(group), laws[small].first / size)) continue;
-      if (effect_traits(work, named(less)).driver == Driver::time &&
-          wanders_by_itself(work, evidence, decision, less, named(group)))
-        continue;
-      out[less] = group;
+  for (std::size_t large = 0; large < laws.size(); ++large) {
+    const auto [size, group] = laws[large];
+    std::vector<int> warmth;
+    for (std::size_t small = large + 1; small < laws.size(); ++small) {
+      const auto [less_size, less] = laws[small];
+      if (out.count(group) || out.count(less) || !(less_size < size)) continue;
+      if (is_departure(work, named(less), named(group), less_size / size)) out[less] = group;
+      if (may_be_warmth(work, named(less), named(group))) warmth.push_back(less);
     }
+    for (const int g : left_by_warmth(work, evidence, decision, warmth, named(group))) out[g] = group;
   }
   return out;
 }

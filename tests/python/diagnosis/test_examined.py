@@ -81,3 +81,15 @@ def test_held_out_errors_that_nearly_double_are_not_explained_by_chance() -> Non
     assert found.held_out_fall.probability > 0.05  # eight poses scatter too much to say more
     assert found.verdict == "does_not_hold"
     assert small_sets.rms(found.robot, data) == pytest.approx(small_sets.rms(found.robot_before, data))
+
+
+@pytest.mark.parametrize("which", ["machines/44@9911", "machines/20@9912", "machines/44@9912"])
+def test_a_robot_that_warms_late_is_neither_a_frame_that_drifts_nor_a_wrong_metre(which: str) -> None:
+    """Links warm behind the sensor, with time recorded or the order of rows in its place: it was `drift`,
+    `scale` or both beside `thermal`, .96 to .99 sure.
+    """
+    robot, data, _ = make(f"examination/{which}")
+    found = truing.diagnose(robot, data)
+    assert (found.effects[0].effect, found.effects[0].joints) == ("thermal", ())
+    assert "what it leaves looks like" in found.effects[0].note
+    assert not {"drift", "scale"} & {e.effect for e in found.effects}
