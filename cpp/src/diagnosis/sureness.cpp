@@ -204,13 +204,17 @@ static double as_lagging_warmth(const Work& work, const Evidence& evidence, cons
                                 const Explanation& law, const std::vector<int>& time) {
   const auto& groups = work.design.candidates.groups;
   double best = -1e300;
+  std::vector<int> of_all_links;  // a function of every link's own
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const Explanation& e = work.design.candidates.named[g];
     const bool is_of_law =
         e.kind == Kind::law && e.effect == law.effect && (law.joints.empty() || e.joints == law.joints);
-    if (is_of_law && !groups[g].columns.empty())
-      best = std::max(best, evidence.gain(rest, groups[g].columns, 0.0).evidence);
+    if (!is_of_law || groups[g].columns.empty()) continue;
+    best = std::max(best, evidence.gain(rest, groups[g].columns, 0.0).evidence);
+    if (!e.joints.empty()) of_all_links.insert(of_all_links.end(), groups[g].columns.begin(), groups[g].columns.end());
   }
+  if (law.joints.empty() && !of_all_links.empty())
+    best = std::max(best, evidence.gain(rest, of_all_links, 0.0).evidence);
   if (time.empty()) return best;
   FreeScanOptions of_time;
   of_time.flips = 0;
