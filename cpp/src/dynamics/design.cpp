@@ -411,6 +411,19 @@ std::vector<Noise> noise_of(const Tiles& tiles, const std::function<MatrixXd(Til
   return out;
 }
 
+TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& groups) {
+  TorqueDesign out;
+  for (const int g : groups) {
+    TorqueGroup group = whole.groups[static_cast<std::size_t>(g)];
+    for (int& column : group.columns) {
+      out.terms.push_back(whole.terms[static_cast<std::size_t>(column)]);
+      column = static_cast<int>(out.terms.size()) - 1;
+    }
+    out.groups.push_back(std::move(group));
+  }
+  return out;
+}
+
 namespace {
 
 double rows_counted(const Noise& noise, std::size_t fold) {

@@ -54,6 +54,9 @@ void add_effect(const TorqueEffect& effect, int joint, const Robot& robot, const
 /// Free functions of what may drive an unknown effect, at every joint.
 void add_free_functions(const Robot& robot, const MotionRange& range, TorqueDesign* design);
 
+/// Some groups of a design, in this order.
+TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& groups);
+
 /// Which tile rows belong to which fold.
 struct Folds {
   std::vector<int> of_recording;  ///< -1: not of these folds

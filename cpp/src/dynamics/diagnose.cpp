@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <optional>
 
 #include "dynamics/columns.hpp"
@@ -80,67 +79,16 @@ std::vector<FoldGram> held_out_of(const Problem& problem, const Account& account
   return out;
 }
 
-/// The columns that are always in, and the terms of a choice; `choice` becomes that of the part, in the same order.
-TorqueDesign part_of(const TorqueDesign& whole, const std::vector<int>& nuisance, Choice* choice) {
-  TorqueDesign out;
-  const std::vector<int> chosen = choice->groups;
-  for (std::size_t g = 0; g < whole.groups.size(); ++g) {
-    TorqueGroup group = whole.groups[g];
-    const auto at = std::find(chosen.begin(), chosen.end(), static_cast<int>(g));
-    const bool always = std::find(nuisance.begin(), nuisance.end(), group.columns.front()) != nuisance.end();
-    if (!always && at == chosen.end()) continue;
-    if (at != chosen.end())
-      choice->groups[static_cast<std::size_t>(at - chosen.begin())] = static_cast<int>(out.groups.size());
-    for (int& column : group.columns) {
-      out.terms.push_back(whole.terms[static_cast<std::size_t>(column)]);
-      column = static_cast<int>(out.terms.size()) - 1;
-    }
-    out.groups.push_back(std::move(group));
+/// Groups that are always in or chosen, in the design's order.
+std::vector<int> groups_in(const TorqueDesign& design, const std::vector<int>& nuisance, const Choice& choice) {
+  std::vector<int> out;
+  for (std::size_t g = 0; g < design.groups.size(); ++g) {
+    const int column = design.groups[g].columns.front(), number = static_cast<int>(g);
+    const bool always = std::find(nuisance.begin(), nuisance.end(), column) != nuisance.end();
+    const bool chosen = std::find(choice.groups.begin(), choice.groups.end(), number) != choice.groups.end();
+    if (always || chosen) out.push_back(number);
   }
   return out;
-}
-
-/// Everything chosen, fitted again with other turns.
-class Refit {
- public:
-  /// `seen`: the model whose torque some terms need.
-  Refit(const Problem& problem, const TorqueDesign& whole, const Choice& choice, const TorqueModel& seen,
-        const std::vector<Noise>& noise)
-      : problem_(problem),
-        seen_(seen),
-        noise_(noise),
-        design_(part(whole, choice)),
-        table_(problem.tiles, design_),
-        columns_(design_.terms.size()) {
-    std::iota(columns_.begin(), columns_.end(), 0);
-  }
-
-  /// Errors by joint with the turns that are set.
-  std::vector<double> errors() {
-    table_.turned();
-    grams_ = sum_grams(table_, problem_.nominal, seen_.turning(problem_.range.turns), problem_.train, {grams_, true});
-    const Fit fit = fit_of(sums_of(grams_, noise_, design_, inertial_columns(design_)), columns_);
-    return rms_of(table_, problem_.nominal, seen_, by_column(design_, fit), problem_.train);
-  }
-
- private:
-  static TorqueDesign part(const TorqueDesign& whole, Choice choice) {
-    return part_of(whole, standard_columns(whole), &choice);
-  }
-
-  const Problem& problem_;
-  const TorqueModel& seen_;
-  const std::vector<Noise>& noise_;
-  TorqueDesign design_;
-  DesignColumns table_;
-  std::vector<int> columns_;
-  TorqueGrams grams_;  ///< with the turns before
-};
-
-bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
-    return one.speed == other.speed && one.travel == other.travel && one.fade == other.fade;
-  });
 }
 
 /// The choice fitted, as a model beside the nominal one.
@@ -259,9 +207,12 @@ constexpr int kMostFunctions = 6;               ///< more of them are no answer 
 /// named makes room: it may be what little a law can do for something that nobody knows. It is `small` of the account.
 Account with_functions(const Problem& problem, const Account& of_effects, const TorqueModel& model,
                        const SearchLimits& limits, std::vector<Noise>* noise) {
-  Choice fitted = of_effects.choice;
   const std::vector<int>& always = of_effects.search->evidence().nuisance();
-  auto design = std::make_shared<TorqueDesign>(part_of(*of_effects.design, always, &fitted));
+  const std::vector<int> groups = groups_in(*of_effects.design, always, of_effects.choice);
+  auto design = std::make_shared<TorqueDesign>(part_of(*of_effects.design, groups));
+  Choice fitted = of_effects.choice;
+  for (int& group : fitted.groups)
+    group = static_cast<int>(std::find(groups.begin(), groups.end(), group) - groups.begin());
   std::vector<int> nuisance;
   for (std::size_t g = 0; g < design->groups.size(); ++g) {
     const std::vector<int>& columns = design->groups[g].columns;
@@ -320,10 +271,8 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   for (int round = 0; round < kRounds; ++round) {
     bool turned = false;
     if (round + 1 == kRounds && !problem.fitted_before) {
-      const std::vector<FrictionTurn> before = problem.range.turns;
-      Refit refit(problem, *design, choice, model, noise);
-      choose_turns(&problem, true, [&] { return refit.errors(); });
-      turned = !same(problem.range.turns, before);
+      const TorqueDesign chosen = part_of(*design, groups_in(*design, standard_columns(*design), choice));
+      turned = choose_turns_again(&problem, chosen, model, noise, true);
       if (turned) {
         *design = whole_design(problem, options);  // of the same groups
         columns->turned();

@@ -114,6 +114,11 @@ std::vector<int> columns_of(const TorqueDesign& design, const std::vector<int>& 
   return out;
 }
 
+/// Effects beyond those that the groundwork has.
+bool asks_for_more(const TorqueDesign& design) {
+  return std::any_of(design.groups.begin(), design.groups.end(), [](const TorqueGroup& g) { return !g.standard; });
+}
+
 bool scales_masses(const TorqueDesign& design, const TorqueOptions& options) {
   return std::any_of(design.groups.begin(), design.groups.end(), [&](const TorqueGroup& group) {
     return find_torque_effect(group.effect, options.own_effects).traits.scales_masses;
@@ -129,9 +134,9 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   require_usable(robot, recordings);
   Problem problem(robot, recordings, {options.cutoff, options.test_share, options.threads, options.own_effects});
   const Groundwork groundwork = groundwork_of(&problem);
-  const TorqueDesign design = requested_design(problem, options);
+  TorqueDesign design = requested_design(problem, options);
   const std::vector<bool> with_prior = inertial_columns(design);
-  const DesignColumns columns(problem.tiles, design, Resting::left_out);
+  DesignColumns columns(problem.tiles, design, Resting::left_out);
 
   TorqueFit out;
   TorqueModel model = groundwork.model;
@@ -145,7 +150,16 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   const bool scaled = scales_masses(design, options);
   const int rounds = scaled ? 6 : 2;
   for (int round = 0; round < rounds; ++round) {
-    grams = sum_grams(columns, problem.nominal, model, problem.train, {grams});
+    bool turned = false;
+    if (round == 1 && asks_for_more(design) && !problem.fitted_before) {
+      turned = choose_turns_again(&problem, part_of(design, groups), model, noise, false);
+      if (turned) {
+        design = requested_design(problem, options);  // of the same groups
+        columns.turned();
+        model = model.turning(problem.range.turns);
+      }
+    }
+    grams = sum_grams(columns, problem.nominal, model, problem.train, {grams, turned});
     sums = sums_of(grams, noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));

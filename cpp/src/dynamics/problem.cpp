@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "dynamics/columns.hpp"
 #include "dynamics/effects/families.hpp"
@@ -586,6 +587,9 @@ std::vector<TorqueErrors> errors_of(const Problem& problem,
 
 // --- the turn of friction ------------------------------------------------------------------------
 
+namespace {
+
+/// `errors_with`: rms errors by joint of what is fitted with the turns that are set [Nm | N].
 void choose_turns(Problem* problem, bool may_fade, const std::function<std::vector<double>()>& errors_with) {
   constexpr FrictionTurn kTurns[] = {{0.01, 0.0},  {1e-3, 0.0},  {3e-4, 0.0},       {0.01, 1e-6},
                                      {0.01, 1e-5}, {0.01, 1e-4}, {0.01, 1e-4, 1.0}, {0.01, 1e-4, 10.0}};
@@ -610,6 +614,30 @@ void choose_turns(Problem* problem, bool may_fade, const std::function<std::vect
     }
   }
   set(chosen);
+}
+
+bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
+    return one.speed == other.speed && one.travel == other.travel && one.fade == other.fade;
+  });
+}
+
+}  // namespace
+
+bool choose_turns_again(Problem* problem, const TorqueDesign& design, const TorqueModel& seen,
+                        const std::vector<Noise>& noise, bool may_fade) {
+  const std::vector<FrictionTurn> before = problem->range.turns;
+  DesignColumns table(problem->tiles, design);
+  std::vector<int> columns(design.terms.size());
+  std::iota(columns.begin(), columns.end(), 0);
+  TorqueGrams grams;  // with the turns before
+  choose_turns(problem, may_fade, [&] {
+    table.turned();
+    grams = sum_grams(table, problem->nominal, seen.turning(problem->range.turns), problem->train, {grams, true});
+    const Fit fit = fit_of(sums_of(grams, noise, design, inertial_columns(design)), columns);
+    return rms_of(table, problem->nominal, seen, by_column(design, fit), problem->train);
+  });
+  return !same(problem->range.turns, before);
 }
 
 Groundwork groundwork_of(Problem* problem, bool may_fade) {

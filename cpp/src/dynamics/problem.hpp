@@ -93,15 +93,17 @@ struct Groundwork {
   TorqueModel model;
   std::vector<Noise> noise;
 };
-/// How friction turns is chosen first (choose_turns), and, if it `may_fade`, how long it lasts at rest: that is a law
-/// more, which nobody asks for who asks for Coulomb friction.
+/// How friction turns is chosen first (as choose_turns_again does), and, if it `may_fade`, how long it lasts at rest:
+/// that is a law more, which nobody asks for who asks for Coulomb friction.
 Groundwork groundwork_of(Problem* problem, bool may_fade = false);
 
 /// Sets MotionRange::turns, and those of the nominal model, to what leaves the smallest errors at every joint on the
 /// training rows, those at rest included: how friction is left at rest is part of how it turns. Friction that a model
-/// turns more slowly than the joint does, or forgets at rest, would look like presliding and like Stribeck's curve.
-/// `errors_with`: rms errors by joint on these rows of what is fitted with the turns that are set [Nm | N].
-void choose_turns(Problem* problem, bool may_fade, const std::function<std::vector<double>()>& errors_with);
+/// turns more slowly than the joint does, or forgets at rest, would look like presliding and like Stribeck's curve;
+/// what the groundwork lacks may look like another turn, so they are chosen again beside all terms of `design`. `seen`:
+/// the model whose torque some terms need. True: others than before.
+bool choose_turns_again(Problem* problem, const TorqueDesign& design, const TorqueModel& seen,
+                        const std::vector<Noise>& noise, bool may_fade);
 /// The robot with what a fit found: link inertias added to its links, effects to its torque effects.
 Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<int>& groups, const Fit& fit,
               const MotionRange& range);

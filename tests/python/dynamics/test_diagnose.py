@@ -209,6 +209,17 @@ def test_friction_chosen_over_another_torque_takes_no_rotor_with_it() -> None:
     assert np.exp(np.log(percent(found, "named")).mean()) < 9.5  # 10.4 before
 
 
+@pytest.mark.realdata
+def test_identify_chooses_how_friction_turns_beside_what_it_was_asked_for() -> None:
+    """Beside rotors' inertias the second joint's friction turns by its travel: by the speed 14 % are left."""
+    folder = real("dyn_tx40")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    recordings = load_recordings([folder / "run.csv"], robot)
+    fitted = identify(robot, recordings, effects=["coulomb", "viscous", "armature"], cutoff=20.0)
+    assert any(p.name == "coulomb.joint_2.turn_travel" for p in fitted.parameters)
+    assert fitted.errors[-1].held_out[1].percent < 10.5
+
+
 def test_a_recording_of_short_strokes_outvotes_no_others(tmp_path: Path) -> None:
     """Friction that changes over a turn, twice the noise, which one slow recording of four hardly shows."""
     robot, recordings = sets.build("development/single/22@3611").write(tmp_path)

@@ -80,7 +80,7 @@ def test_the_model_alone_moves_better_than_with_friction_that_stands_in(
     judged = judge(models, held, horizons=(0.5, 2.0), most=40)
     for horizon in judged.windows.horizons:
         whole, alone, instead = (judged.worst_joint(name, horizon) for name in models)
-        assert whole < alone < 1.02 * instead
+        assert whole < alone < 1.03 * instead
     assert alone < 0.9 * instead  # 2 s ahead
 
 
