@@ -7415,6 +7415,13 @@ class TorqueDiagnosis:
         What the recordings could not show.
         """
     @property
+    def remainders(self) -> tuple[str, ...]:
+        """
+        Joints at which 'with_unknown' has a little of every other effect beside what was named, for folds
+        gain by it: what is left there is no noise, but small causes or other laws that cannot be told
+        apart.
+        """
+    @property
     def robot(self) -> Robot:
         """
         With what was named.

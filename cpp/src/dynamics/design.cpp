@@ -446,6 +446,7 @@ FoldGram::FoldGram(TorqueGrams grams, std::size_t fold, const std::vector<Noise>
     const Gram& gram = (*grams_)[j].folds[fold];
     const double rows = rows_counted(noise[j], fold);
     weights_.push_back(rows / (noise[j].sigma * noise[j].sigma));
+    design_effects_.push_back(noise[j].design_effect);
     yy_ += weights_[j] * gram.yy;
     n_ += rows * gram.n;
   }

@@ -116,10 +116,14 @@ class FoldGram {
   double product(int one, int other) const;
   double product(int column) const;
 
+  const TorqueGrams& joints() const { return grams_; }
+  double design_effect(std::size_t joint) const { return design_effects_[joint]; }
+
  private:
   TorqueGrams grams_;
   std::size_t fold_;
-  std::vector<double> weights_;  ///< of the joints' squares
+  std::vector<double> weights_;         ///< of the joints' squares
+  std::vector<double> design_effects_;  ///< of the joints' noise
   double yy_ = 0.0, n_ = 0.0;
 };
 

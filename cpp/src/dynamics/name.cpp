@@ -11,6 +11,7 @@
 #include "dynamics/beside.hpp"
 #include "dynamics/judge.hpp"
 #include "dynamics/payload.hpp"
+#include "dynamics/remainder.hpp"
 #include "estimation/confidence.hpp"
 #include "math/text.hpp"
 
@@ -595,6 +596,12 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
   return out;
 }
 
+/// A fit as it is handed over.
+Fit bodies_of(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Fit& fit,
+              std::vector<std::string>* warnings) {
+  return problem.fitted_before ? fit : with_bodies(problem.robot, design, sums, fit, warnings);
+}
+
 /// The robot with its groundwork, where it had none, and with further groups, of bodies that there can be.
 /// `inertias_given`: the groundwork has no inertias.
 Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Fit& fit,
@@ -604,8 +611,7 @@ Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const 
     if (group.standard && !(inertias_given && is_inertial(group))) groups.push_back(static_cast<int>(g));
   }
   std::sort(groups.begin(), groups.end());
-  const Fit bodies = problem.fitted_before ? fit : with_bodies(problem.robot, design, sums, fit, warnings);
-  return applied(problem.robot, design, groups, bodies, problem.range);
+  return applied(problem.robot, design, groups, bodies_of(problem, design, sums, fit, warnings), problem.range);
 }
 
 /// Groups of a choice that are effects.
@@ -747,30 +753,65 @@ std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice&
 
 namespace {
 
-/// Errors of the named robot, and at joints with free functions that help, those of all that was fitted with these.
-/// `model`: the named robot's, over whose torque functions of the load were fitted.
-TorqueErrors errors_with_functions(const Problem& problem, Account functions, const TorqueModel& model,
-                                   const TorqueErrors& of_named, double least_gain) {
+/// Joints take their errors with another model.
+void take_errors(const Problem& problem, const TorqueModel& model, const std::set<std::size_t>& joints,
+                 TorqueErrors* out) {
+  if (joints.empty()) return;
+  const TorqueErrors with = errors_of(problem, {{out->model, model}}).front();
+  for (const std::size_t j : joints) {
+    out->held_out[j] = with.held_out[j];
+    out->train[j] = with.train[j];
+  }
+}
+
+/// Of joints with free functions that help, errors of all that was fitted with these; the joints. `model`: the named
+/// robot's, over whose torque functions of the load were fitted.
+std::set<std::size_t> take_errors_with_functions(const Problem& problem, Account functions, const TorqueModel& model,
+                                                 double least_gain, TorqueErrors* out) {
   functions.choice = with_functions_that_help(problem, functions, model, least_gain);
-  const std::vector<int>& groups = functions.choice.groups;
   std::set<std::size_t> joints;
-  for (const int g : groups) {
+  for (const int g : functions.choice.groups) {
     const TorqueGroup& group = group_of(*functions.design, g);
     if (group.effect.empty()) joints.insert(static_cast<std::size_t>(group.joint));
   }
-  TorqueErrors out = of_named;
-  out.model = "with_unknown";
-  if (joints.empty()) return out;
+  if (joints.empty()) return joints;
   const Naming naming(functions);
   std::vector<std::string> said_already;
   const Robot robot = robot_of(problem, functions, naming, &said_already);
   const TorqueModel whole = with_free_functions(problem, robot, *functions.design, naming.fit()).seeing(model);
-  const TorqueErrors with = errors_of(problem, {{out.model, whole}}).front();
-  for (const std::size_t j : joints) {
-    out.held_out[j] = with.held_out[j];
-    out.train[j] = with.train[j];
+  take_errors(problem, whole, joints, out);
+  return joints;
+}
+
+/// Of other joints at which it helps, errors with a remainder; the joints.
+std::set<std::size_t> take_errors_with_remainders(const Problem& problem, const Account& account, const Naming& naming,
+                                                  const TorqueModel& model, const std::set<std::size_t>& but,
+                                                  TorqueErrors* out) {
+  // So many columns bend to anything, and blocks of a single recording have more in common than recordings.
+  const double least_gain = problem.single ? 0.1 : 0.05;
+  std::vector<std::string> said_already;
+  const Fit handed_over = bodies_of(problem, *account.design, *account.sums, naming.fit(), &said_already);
+  std::set<std::size_t> joints;
+  std::vector<ValuedTerm> terms;
+  for (const Remainder& one : remainders_beside(account, handed_over, least_gain)) {
+    if (but.count(one.joint)) continue;
+    joints.insert(one.joint);
+    terms.insert(terms.end(), one.terms.begin(), one.terms.end());
   }
-  return out;
+  take_errors(problem, model.with(terms).seeing(model), joints, out);
+  return joints;
+}
+
+/// Errors of the named robot, and of joints at which they help with what has no name.
+void say_errors_with_unknown(const Problem& problem, const Account& account, const Naming& naming,
+                             const Account& functions, const TorqueModel& model, double least_gain,
+                             TorqueDiagnosis* out) {
+  TorqueErrors errors = out->errors.back();
+  errors.model = "with_unknown";
+  const std::set<std::size_t> joints = take_errors_with_functions(problem, functions, model, least_gain, &errors);
+  for (const std::size_t j : take_errors_with_remainders(problem, account, naming, model, joints, &errors))
+    out->remainders.push_back(errors.held_out[j].joint);
+  out->errors.push_back(std::move(errors));
 }
 
 }  // namespace
@@ -796,7 +837,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.robot = robot_of(problem, account, naming, &out.warnings);
   const TorqueModel model = model_of(out.robot, problem);
   out.errors = errors_of(problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}});
-  out.errors.push_back(errors_with_functions(problem, functions, model, out.errors[2], least_gain));
+  say_errors_with_unknown(problem, account, naming, functions, model, least_gain, &out);
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
   out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);

@@ -59,7 +59,7 @@ MODELS = {
     "nominal": ("nominal model", NOMINAL),
     "standard": ("standard practice", BEFORE),
     "named": ("named effects", AFTER),
-    "with_unknown": ("and free functions", UNKNOWN),
+    "with_unknown": ("and what has no name", UNKNOWN),
 }
 INPUTS = {
     "speed": ("speed", "slow", "fast"),
@@ -474,10 +474,22 @@ def _trace_layout(buttons: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+def remainder_sentence(joints: Sequence[str]) -> str:
+    """What errors with a little of every effect tell of these joints; empty where there are none."""
+    if not joints:
+        return ""
+    where = " and ".join(filter(None, (", ".join(joints[:-1]), joints[-1])))
+    return (
+        f"At {where} a little of every other effect beside what was named predicts held-out torques better: "
+        "small causes, or other laws, that cannot be told apart."
+    )
+
+
 def _error_card(page: Page, result: Mapping[str, Any]) -> None:
     """Held-out error of every joint and model. Bars of the nominal model may be cut off; all have numbers."""
     errors = result["torque"]["held_out"]
-    models = [m for m in MODELS if errors.get(m) and (m != "with_unknown" or result.get("unknown"))]
+    nameless = result.get("unknown") or result.get("remainders")
+    models = [m for m in MODELS if errors.get(m) and (m != "with_unknown" or nameless)]
     page.add(
         '<section class="card"><h2>Error of every joint <span class="muted">held out, in % of its torque'
         "</span></h2>"
@@ -501,7 +513,7 @@ def _error_card(page: Page, result: Mapping[str, Any]) -> None:
     off = any((errors[m][j] or 0.0) > top for m in models for j in joints)
     page.add(
         f'<p class="note">{USUAL}{" Bars that reach the top are cut off: their numbers hold." if off else ""}'
-        "</p></section>"
+        f" {escaped(remainder_sentence(result.get('remainders', ())))}</p></section>"
     )
 
 

@@ -70,6 +70,7 @@ def diagnosis_dict(
         "effects": [*map(_load, said.loads), *map(_effect, found.effects)],
         "covariance": covariance_dict(parameters_of(found), found.covariance),
         "unknown": [_unknown(u) for u in found.unknown],
+        "remainders": list(found.remainders),
         "where": where_dict(found.where, found.errors),
         **_errors(found.errors),
         "without_names_percent": found.without_names,

@@ -220,6 +220,20 @@ def test_identify_chooses_how_friction_turns_beside_what_it_was_asked_for() -> N
     assert fitted.errors[-1].held_out[1].percent < 10.5
 
 
+@pytest.mark.realdata
+def test_what_is_left_at_a_joint_may_be_a_little_of_everything() -> None:
+    folder = real("dyn_ur10e")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    for index, gain in zip(robot.driven_joints(), UR10E_GAINS, strict=True):
+        robot.joints[index].torque_per_ampere = gain
+    recordings = load_recordings([f for f in sorted(folder.glob("h*.csv")) if "load" not in f.name], robot)
+    found, again = (diagnose(robot, recordings, threads=threads) for threads in (1, 2))
+    assert found.remainders == ("shoulder_pan_joint", "wrist_1_joint", "wrist_3_joint")
+    named, whole = percent(found, "named"), percent(found, "with_unknown")
+    assert (whole[[0, 3, 5]] < 0.95 * named[[0, 3, 5]]).all()
+    assert (whole == percent(again, "with_unknown")).all()
+
+
 def test_a_recording_of_short_strokes_outvotes_no_others(tmp_path: Path) -> None:
     """Friction that changes over a turn, twice the noise, which one slow recording of four hardly shows."""
     robot, recordings = sets.build("development/single/22@3611").write(tmp_path)

@@ -104,7 +104,7 @@ def test_result_has_what_the_contract_lists(result: dict[str, Any]) -> None:
     assert result["held_out"] == ["motion4", "motion5"]
     assert result["sanity"] == [] and result["cutoff_hz"] > 0
     assert result["warnings"][0] == "a warning about the input"
-    for key in ("unknown", "classes", "not_testable"):
+    for key in ("unknown", "remainders", "classes", "not_testable"):
         assert isinstance(result[key], list)
 
 

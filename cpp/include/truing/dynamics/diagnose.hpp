@@ -101,7 +101,10 @@ struct TorqueDiagnosis {
   /// the others; then what is standard.
   std::vector<FoundTorqueEffect> effects;
   Eigen::MatrixXd covariance;  ///< shape=(m, m): of the effects' parameters that are not frozen, one after the other
-  std::vector<UnknownTorque> unknown;     ///< what no effect explains
+  std::vector<UnknownTorque> unknown;  ///< what no effect explains
+  /// Joints at which 'with_unknown' has a little of every other effect beside what was named, for folds gain by it:
+  /// what is left there is no noise, but small causes or other laws that cannot be told apart.
+  std::vector<std::string> remainders;
   std::vector<TorqueErrors> errors;       ///< 'nominal', 'standard', 'named', 'with_unknown'
   double without_names = 0.0;             ///< [%] held-out error, geometric mean over the joints, that names start from
   std::vector<TorqueRegime> where;        ///< the gap by joint and part of the motion
