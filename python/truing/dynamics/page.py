@@ -598,7 +598,7 @@ def _cause_line(effect: Mapping[str, Any]) -> str:
     size = "" if is_load(effect) else f"{figures_text(effect['rms_Nm'] or 0.0)} Nm"
     return (
         f'<tr><td>{escaped(plain(effect))}<span class="maybe">{escaped(maybe)}</span></td>'
-        f"<td>{escaped(place(effect).removeprefix('at '))}</td><td>{removes}</td>"
+        f'<td class="wrap">{escaped(place(effect).removeprefix("at "))}</td><td>{removes}</td>'
         f'<td class="n">{size}</td>'
         f"<td>{escaped(sure_text(effect['probability']))}</td>"
         f'<td class="wide">{escaped(size_text(effect))}</td></tr>'
