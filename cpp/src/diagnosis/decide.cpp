@@ -136,7 +136,7 @@ static double least_share_of_law(const EffectTraits& traits, bool smooth) {
   return follows_own_angle(traits) && !smooth ? 0.75 : 0.65;
 }
 
-std::vector<int> columns_of(const Work& work, const std::vector<int>& groups) {
+std::vector<int> columns_of_groups(const Work& work, const std::vector<int>& groups) {
   std::vector<int> out;
   for (const int g : groups) {
     const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(g)].columns;
@@ -317,7 +317,7 @@ static Question question_of(const Work& work, const Robot& robot, const Choice& 
 static double share_of_shape(const Work& work, const Evidence& evidence, const Evidence::State& rest,
                              const Question& q) {
   if (q.what.inputs.size() != 1 || q.what.law_test != LawTest::of_driver) return 0.0;
-  const Evidence::Gain gain = evidence.gain(rest, columns_of(work, {q.function}), 0.0);
+  const Evidence::Gain gain = evidence.gain(rest, columns_of_groups(work, {q.function}), 0.0);
   Decision alone;
   Choice choice = rest.choice;
   choice.groups.push_back(q.function);
@@ -395,7 +395,7 @@ static bool replace_laws(Work* work, const Robot& robot, const Question& q, Deci
   const int fine = add_fine_function(work, robot, q.joint, inputs);
   extend_grams(work->design, work->noise.design_effect, &work->grams);
   const Evidence again = evidence_now(*work);
-  const Evidence::Gain gain = again.gain(again.evaluate(remaining), columns_of(*work, {fine}), 0.0);
+  const Evidence::Gain gain = again.gain(again.evaluate(remaining), columns_of_groups(*work, {fine}), 0.0);
   Choice alone = remaining;
   alone.groups.push_back(fine);
   alone.scales.push_back(gain.scale);
@@ -423,7 +423,7 @@ static void keep_as_correction(Work* work, const Evidence& evidence, int functio
     choice.scales.push_back(law.scale);
   }
   auto& groups = work->design.candidates.groups;
-  const Evidence::Gain left = evidence.gain(evidence.evaluate(choice), columns_of(*work, {function}), 0.0);
+  const Evidence::Gain left = evidence.gain(evidence.evaluate(choice), columns_of_groups(*work, {function}), 0.0);
   choice.groups.push_back(function);
   choice.scales.push_back(left.scale);
   decision->state = evidence.evaluate(choice);

@@ -193,7 +193,7 @@ bool has_law_at(const Work& work, const Explanation& e, const std::string& joint
 /// Index of an input; -1: there is none of that name.
 int input_named(const Work& work, const std::string& name);
 /// Columns of some groups, one after the other.
-std::vector<int> columns_of(const Work& work, const std::vector<int>& groups);
+std::vector<int> columns_of_groups(const Work& work, const std::vector<int>& groups);
 /// A choice less one group, and less what corrects its law.
 Choice without(const Choice& choice, const std::vector<ColumnGroup>& groups, std::size_t at);
 /// A choice less some groups.

@@ -238,7 +238,7 @@ static bool stand_by_themselves(const Work& work, const Evidence& evidence, cons
     const std::vector<int>& inputs = work.design.candidates.named[static_cast<std::size_t>(g)].inputs;
     time.insert(time.end(), inputs.begin(), inputs.end());
   }
-  const double by_names = evidence.gain(rest, columns_of(work, names), 0.0).evidence;
+  const double by_names = evidence.gain(rest, columns_of_groups(work, names), 0.0).evidence;
   return by_names > as_lagging_warmth(work, evidence, rest, law, time) + decision.search.threshold;
 }
 
@@ -277,7 +277,7 @@ std::map<int, int> departures_from_laws(const Work& work, const Evidence& eviden
   };
   std::vector<std::pair<double, int>> laws;  // the largest first
   for (const int g : decision.state.choice.groups) {
-    if (is_law(work, named(g))) laws.emplace_back(size_at_tip(work, decision.state, columns_of(work, {g})), g);
+    if (is_law(work, named(g))) laws.emplace_back(size_at_tip(work, decision.state, columns_of_groups(work, {g})), g);
   }
   std::sort(laws.rbegin(), laws.rend());
   std::map<int, int> out;

@@ -11,12 +11,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kParts[] = {1.0, 0.3, 0.1, 0.03};  ///< of what is left, that one column may make
+constexpr double kRidgeParts[] = {1.0, 0.3, 0.1, 0.03};  ///< of what is left, that one column may make
 
-/// By column of the design, the choice as it is handed over, less what the others would have said without one fold:
-/// that of the fit of any numbers. Fits of bodies to all but each fold would take their time.
-VectorXd without_fold(const Account& account, const Evidence::State& state, const FoldGram& fold,
-                      const VectorXd& handed_over) {
+/// By column of the design, the choice as it is handed over, moved as the fit of any numbers moves where it is made
+/// without a fold. Fits of bodies to all but each fold would take their time.
+VectorXd handed_over_without(const Account& account, const Evidence::State& state, const FoldGram& fold,
+                             const VectorXd& handed_over) {
   const Gram held = fold.of(state.columns);
   Gram others = account.sums->all.of(state.columns);
   others.xx -= held.xx;
@@ -74,7 +74,7 @@ Left left_of(const Gram& gram, const std::vector<Index>& places, const VectorXd&
           gram.yy + chosen.dot(product) - 2.0 * chosen.dot(gram.xy)};
 }
 
-Gram without(const Gram& all, const Gram& fold) {
+Gram less(const Gram& all, const Gram& fold) {
   return {all.xx - fold.xx, all.xy - fold.xy, all.yy - fold.yy, all.n - fold.n};
 }
 
@@ -86,7 +86,7 @@ VectorXd ridge(const Left& left, const VectorXd& square, double design_effect, d
 }
 
 /// Squares of folds before, and what predictions p of them gain, 2 s b - s^2 c when they are shrunken by s.
-struct Predicted {
+struct RidgeGains {
   VectorXd before, b, c;
 
   double shrink() const { return std::clamp(b.sum() / std::max(c.sum(), 1e-300), 0.0, 1.0); }
@@ -105,18 +105,18 @@ class Rest {
   }
 
   /// Every fold by the fit to the others, for every part. `chosen`: values of the choice without each fold.
-  std::vector<Predicted> predicted(const std::vector<VectorXd>& chosen) const {
+  std::vector<RidgeGains> gains(const std::vector<VectorXd>& chosen) const {
     const auto folds = static_cast<Index>(joint_.folds.size());
     const VectorXd none = VectorXd::Zero(folds);
-    std::vector<Predicted> out(std::size(kParts), {none, none, none});
+    std::vector<RidgeGains> out(std::size(kRidgeParts), {none, none, none});
     for (Index f = 0; f < folds; ++f) {
       const auto at = static_cast<std::size_t>(f);
       const Gram& fold = joint_.folds[at];
       if (fold.xx.size() == 0) continue;
       const VectorXd values = chosen[at](joint_.columns);
-      const Left held = left_of(fold, places_, values), others = left_of(without(all_, fold), places_, values);
+      const Left held = left_of(fold, places_, values), others = left_of(less(all_, fold), places_, values);
       for (std::size_t k = 0; k < out.size(); ++k) {
-        const VectorXd fit = ridge(others, square_, design_effect_, kParts[k]);
+        const VectorXd fit = ridge(others, square_, design_effect_, kRidgeParts[k]);
         out[k].before[f] = held.yy;
         out[k].b[f] = fit.dot(held.xy);
         out[k].c[f] = fit.dot(held.xx * fit);
@@ -146,19 +146,19 @@ std::vector<Remainder> remainders_beside(const Account& account, const Fit& hand
   const Evidence::State& state = account.search->state(account.choice);
   const VectorXd chosen = by_column(design, handed_over);
   std::vector<VectorXd> chosen_without;
-  for (const FoldGram& fold : folds) chosen_without.push_back(without_fold(account, state, fold, chosen));
+  for (const FoldGram& fold : folds) chosen_without.push_back(handed_over_without(account, state, fold, chosen));
   const std::vector<JointGrams>& joints = *folds.front().joints();
   std::vector<Remainder> out;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const Others others = others_of(design, j, joints[j], state.columns);
     if (others.places.empty()) continue;
     const Rest rest(joints[j], others, folds.front().design_effect(j));
-    const std::vector<Predicted> predicted = rest.predicted(chosen_without);
-    const auto best = std::min_element(predicted.begin(), predicted.end(), [](const Predicted& a, const Predicted& b) {
+    const std::vector<RidgeGains> gains = rest.gains(chosen_without);
+    const auto best = std::min_element(gains.begin(), gains.end(), [](const RidgeGains& a, const RidgeGains& b) {
       return a.after().sum() < b.after().sum();
     });
     if (!Search::gains_on_folds(best->before, best->after(), least_gain)) continue;
-    const VectorXd values = best->shrink() * rest.fitted(chosen, kParts[best - predicted.begin()]);
+    const VectorXd values = best->shrink() * rest.fitted(chosen, kRidgeParts[best - gains.begin()]);
     Remainder one{j, {}};
     for (std::size_t k = 0; k < others.places.size(); ++k) {
       const auto column = static_cast<std::size_t>(joints[j].columns[static_cast<std::size_t>(others.places[k])]);
