@@ -155,7 +155,7 @@ def compared(arm: Arm, program: Path | None, figaroh: Path | None) -> tuple[Torq
     lines.append(line("the URDF", percent_of(found, "nominal"), named))
     lines.append(line("truing, its standard practice", percent_of(found, "standard"), named))
     lines.append(line("**truing, named**", named, named, seconds))
-    words = "truing, named, and free functions of what may be unknown"
+    words = "truing, named, and what has no name"
     lines.append(line(words, percent_of(found, "with_unknown"), named))
     if program is None:
         return found, lines
