@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "diagnosis/diagnosis.hpp"
 #include "model/model.hpp"
@@ -131,27 +130,27 @@ static PartedLinks with_links_parted(const Work& work, int links) {
   return out;
 }
 
+constexpr double kBetterOnFolds = 1.05;  ///< sums of squares
+
 /// All links under the prior that these poses speak for; and as far off as robots get, those that they see, or all
 /// where folds are predicted better so.
 static std::vector<Choice> links_alone(const PartedLinks& parted, int links) {
-  constexpr double kBetter = 1.05;  // sums of squares
   std::vector<Choice> out = {{{links}, {parted.likeliest}}};
   if (parted.likeliest == 1.0) return out;
   const Choice all = {{links}, {1.0}}, seen = {{parted.seen, parted.unseen}, {1.0, parted.likeliest}};
   const auto squares = [&](const Choice& choice) { return squares_of_folds(parted.work, choice); };
-  out.push_back(predicts_better(squares(all), squares(seen), kBetter) ? all : seen);
+  out.push_back(predicts_better(squares(all), squares(seen), kBetterOnFolds) ? all : seen);
   return out;
 }
 
 bool links_predict_alone(const Work& work) {
-  constexpr double kBetter = 1.05;  // sums of squares
   const int links = all_links(work);
   if (links < 0 || !is_worth_averaging(work, links)) return false;
   const PartedLinks parted = with_links_parted(work, links);
   const Eigen::VectorXd of_frames = squares_of_folds(work, {});
   const std::vector<Choice> all = links_alone(parted, links);
   return std::any_of(all.begin(), all.end(), [&](const Choice& alone) {
-    return predicts_better(squares_of_folds(parted.work, alone), of_frames, kBetter);
+    return predicts_better(squares_of_folds(parted.work, alone), of_frames, kBetterOnFolds);
   });
 }
 

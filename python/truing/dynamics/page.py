@@ -478,10 +478,9 @@ def remainder_sentence(joints: Sequence[str]) -> str:
     """What errors with a little of every effect tell of these joints; empty where there are none."""
     if not joints:
         return ""
-    where = " and ".join(filter(None, (", ".join(joints[:-1]), joints[-1])))
     return (
-        f"At {where} a little of every other effect beside what was named predicts held-out torques better: "
-        "small causes, or other laws, that cannot be told apart."
+        f"At {_listed(joints)} a little of every other effect beside what was named predicts torques"
+        " that it was not fitted to better: small causes, or other laws, that cannot be told apart."
     )
 
 

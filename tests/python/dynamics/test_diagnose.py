@@ -40,6 +40,11 @@ def named_at_joints(found: truing.dynamics.TorqueDiagnosis) -> set[tuple[str, st
     return {(effect, joint) for effect, joints in beyond_standard(found) for joint in joints}
 
 
+def unloaded(folder: Path, robot: Robot) -> list[Recording]:
+    files = [path for path in sorted(folder.glob("h*.csv")) if "load" not in path.name]
+    return load_recordings(files, robot)
+
+
 def percent(found: truing.dynamics.TorqueDiagnosis, model: str) -> np.ndarray:
     errors = next(e for e in found.errors if e.model == model)
     return np.array([e.percent for e in errors.held_out])
@@ -174,14 +179,10 @@ def test_ur10e_held_out_torque_and_the_payload_that_nobody_told() -> None:
 
 @pytest.mark.realdata
 def test_the_angle_of_a_real_arm_whose_file_is_turned_is_found() -> None:
-    folder = real("dyn_ur10e")
-    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
-    for index, gain in zip(robot.driven_joints(), UR10E_GAINS, strict=True):
-        robot.joints[index].torque_per_ampere = gain
+    robot, folder = ur10e()
     tilt = np.radians(5.0) * np.array([0.6, 0.8, 0.0])
     robot.gravity = np.array(robot.gravity) + np.cross(tilt, robot.gravity)
-    files = [path for path in sorted(folder.glob("h*.csv")) if "load" not in path.name]
-    found = diagnose(robot, load_recordings(files, robot))
+    found = diagnose(robot, unloaded(folder, robot))
     effect = next(e for e in found.effects if e.effect == "base_tilt")
     assert effect.probability > 0.9
     assert [p.value for p in effect.parameters] == pytest.approx(tilt[:2], abs=np.radians(0.3))
@@ -222,11 +223,8 @@ def test_identify_chooses_how_friction_turns_beside_what_it_was_asked_for() -> N
 
 @pytest.mark.realdata
 def test_what_is_left_at_a_joint_may_be_a_little_of_everything() -> None:
-    folder = real("dyn_ur10e")
-    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
-    for index, gain in zip(robot.driven_joints(), UR10E_GAINS, strict=True):
-        robot.joints[index].torque_per_ampere = gain
-    recordings = load_recordings([f for f in sorted(folder.glob("h*.csv")) if "load" not in f.name], robot)
+    robot, folder = ur10e()
+    recordings = unloaded(folder, robot)
     found, again = (diagnose(robot, recordings, threads=threads) for threads in (1, 2))
     assert found.remainders == ("shoulder_pan_joint", "wrist_1_joint", "wrist_3_joint")
     named, whole = percent(found, "named"), percent(found, "with_unknown")
