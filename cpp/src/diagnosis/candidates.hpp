@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "diagnosis/inputs.hpp"
 #include "estimation/evidence.hpp"
 #include "rooms.hpp"
@@ -21,6 +23,12 @@ namespace truing::diagnosis {
 constexpr const char* kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
 /// In place of an effect's name: a function of what was recorded, and of no known cause.
 constexpr const char* kNoEffect = "free";
+
+/// The base seen from where the arm stands: its axes turn about `axis` with the joint that turns the arm.
+struct TurningBase {
+  int angle = -1;  ///< index in make_inputs of that joint's angle; -1: no joint turns the arm as a whole
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of it, in the measurement frame
+};
 
 /// One candidate, as the user reads it and as `identify` is asked for it.
 struct Explanation {
@@ -40,6 +48,7 @@ struct Explanation {
   std::vector<int> inputs;  ///< indices of make_inputs
   std::vector<std::vector<double>> knots;
   LawTest law_test = LawTest::of_driver;  ///< kind law: which function its columns are
+  TurningBase turning{};                  ///< kind free, at the base: its coordinates are those of axes that turn
 };
 
 /// A candidate that is a free function of time from the start, be it named or not.

@@ -455,6 +455,7 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   UnknownEffect out;
   out.joint = e.site;
+  if (e.turning.angle >= 0) out.inputs.push_back(work.inputs[static_cast<std::size_t>(e.turning.angle)].name);
   for (const int input : e.inputs) out.inputs.push_back(work.inputs[static_cast<std::size_t>(input)].name);
   const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at);
   out.held_out_before = shrinkage.before;
@@ -469,6 +470,8 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   std::vector<int> sites = work.design.base_columns;
   if (e.site != "base")
     sites = work.design.joint_column[work.given.frames.robot.joint_index(e.site)];
+  else if (e.turning.angle >= 0)
+    sites = {work.design.turning_base_columns.begin() + 3, work.design.turning_base_columns.end()};
   else if (sites.size() > 3)
     sites.resize(3);
   for (const int site : sites) {
@@ -476,8 +479,11 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   }
   if (!out.curves.empty() && e.inputs.size() == 1 && e.site != "base")
     out.looks_like = shape_of(out.curves[0]) + unrecorded_cause(work, e);
-  if (e.inputs.size() == 2) out.looks_like = "depends on both " + out.inputs[0] + " and " + out.inputs[1];
+  if (out.inputs.size() == 2) out.looks_like = "depends on both " + out.inputs[0] + " and " + out.inputs[1];
   if (e.site == "base") out.looks_like = "the base moves as a function of " + out.inputs[0];
+  if (e.turning.angle >= 0)
+    out.looks_like = "the base, or the bearing of " + out.inputs[0] +
+                     ", gives way towards where the arm points, as a function of " + out.inputs[1];
   return out;
 }
 

@@ -10,11 +10,15 @@
 #include <set>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
 #include "diagnosis/rows.hpp"
 #include "estimation/evaluate.hpp"
 #include "estimation/selection.hpp"
+#include "math/constants.hpp"
 #include "math/random.hpp"
 #include "model/effects/traits.hpp"
+#include "model/gravity.hpp"
 #include "model/model.hpp"
 
 namespace truing::diagnosis {
@@ -29,6 +33,11 @@ double root_mean_square(const std::vector<double>& values, const std::vector<std
   for (const std::int32_t row : rows)
     sum += values[static_cast<std::size_t>(row)] * values[static_cast<std::size_t>(row)];
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(rows.size())));
+}
+
+/// From axes that turn with the arm to the fixed ones, where the joint that turns it stands at `angle`.
+Eigen::Matrix3d turn_of(const TurningBase& base, double angle) {
+  return Eigen::AngleAxisd(angle, base.axis).toRotationMatrix();
 }
 
 /// Approach directions of the joint that an input belongs to; absent: they were not recorded.
@@ -84,6 +93,7 @@ class Designer {
     linearise_core();
     name_core();
     add_products();
+    add_turning_base();
     draw_folds();
     out_.weight = Eigen::VectorXd::Ones(out_.x.rows());
   }
@@ -370,6 +380,47 @@ class Designer {
     }
   }
 
+  /// The first joint that turns, on nothing but slides: its axis has one direction in the base. None: no angle.
+  TurningBase turning_base() const {
+    TurningBase out;
+    for (std::size_t joint = 0; joint < task_.at.joints.size(); ++joint) {
+      if (task_.at.joints[joint].type == JointType::prismatic) continue;
+      const std::string angle = input_name(Driver::angle, joint);
+      for (std::size_t k = 0; k < task_.inputs.size(); ++k)
+        if (task_.inputs[k].name == angle && !task_.inputs[k].constant) out.angle = static_cast<int>(k);
+      const Eigen::VectorXd zero = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(task_.data.joints.size()));
+      out.axis = joint_axis(task_.at, forward_kinematics(task_.at, zero, 0), joint).direction;
+      break;
+    }
+    return out;
+  }
+
+  /// Columns of the base along axes that turn with the arm: what leans towards the arm is a constant along them.
+  void add_turning_base() {
+    if (out_.base_columns.empty()) return;
+    out_.turning_base = turning_base();
+    if (out_.turning_base.angle < 0) return;
+    const std::vector<double>& angle = task_.inputs[static_cast<std::size_t>(out_.turning_base.angle)].values;
+    const Eigen::Index first = out_.x.cols();
+    out_.x.conservativeResize(Eigen::NoChange, first + 6);
+    out_.prior.conservativeResize(first + 6);
+    out_.prior.tail(6).setConstant(kLargest);
+    for (int k = 0; k < 6; ++k) {
+      const int fixed = out_.base_columns[static_cast<std::size_t>(k)];
+      out_.turning_base_columns.push_back(static_cast<int>(first) + k);
+      out_.column_names.push_back(out_.column_names[static_cast<std::size_t>(fixed)] + " towards the arm");
+      out_.column_units.push_back(out_.column_units[static_cast<std::size_t>(fixed)]);
+    }
+    for (Eigen::Index i = 0; i < out_.x.rows(); ++i) {
+      const auto row = static_cast<std::size_t>(out_.row[static_cast<std::size_t>(i)]);
+      const Eigen::Matrix3d turn = turn_of(out_.turning_base, angle[row]);
+      Eigen::Matrix<double, 1, 6> fixed;
+      for (int k = 0; k < 6; ++k) fixed[k] = out_.x(i, out_.base_columns[static_cast<std::size_t>(k)]);
+      out_.x.row(i).segment<3>(first) = fixed.head<3>() * turn;
+      out_.x.row(i).segment<3>(first + 3) = fixed.tail<3>() * turn;
+    }
+  }
+
   /// Folds of whole pose groups, drawn with the seed.
   void draw_folds() {
     out_.folds = kFolds;
@@ -432,6 +483,23 @@ std::function<double(const Inputs&)> function_of(const Explanation& candidate, c
         value += a[m] * b[n] * coefficients[static_cast<Eigen::Index>(from + m * k2 + n)];
     }
     return times * value * (direction ? 0.5 * direction[in.row] : 1.0);
+  };
+}
+
+/// One coordinate of a base, along fixed axes, as a function along axes that turn with the arm: from the hats'
+/// coefficients of its three translations, or three rotations.
+std::function<double(const Inputs&)> function_of_turning(const Explanation& candidate,
+                                                         const Eigen::VectorXd& coefficients,
+                                                         const std::vector<InputColumn>& inputs, int coordinate) {
+  std::vector<std::function<double(const Inputs&)>> along;
+  const std::size_t hats = candidate.knots[0].size();
+  for (int k = 0; k < 3; ++k)
+    along.push_back(
+        function_of(candidate, coefficients, inputs, static_cast<std::size_t>(coordinate / 3 * 3 + k) * hats, 1.0, {}));
+  const std::vector<double>* angle = &inputs[static_cast<std::size_t>(candidate.turning.angle)].values;
+  return [=, turning = candidate.turning](const Inputs& in) {
+    const Eigen::Vector3d value(along[0](in), along[1](in), along[2](in));
+    return turn_of(turning, (*angle)[in.row]).row(coordinate % 3).dot(value);
   };
 }
 
@@ -510,7 +578,10 @@ Effect free_effect(const Explanation& candidate, const Eigen::VectorXd& coeffici
       term.parameter = parameter;
       term.unit = "-";
       term.site = site;
-      term.basis = function_of(candidate, coefficients, inputs, shared ? 0 : terms.size() * hats, times, direction);
+      term.basis =
+          candidate.turning.angle >= 0
+              ? function_of_turning(candidate, coefficients, inputs, static_cast<int>(terms.size()))
+              : function_of(candidate, coefficients, inputs, shared ? 0 : terms.size() * hats, times, direction);
       terms.push_back(std::move(term));
     }
     return terms;
@@ -525,8 +596,40 @@ bool fits_in_tables(const Explanation& candidate, const std::vector<InputColumn>
                      [&](int input) { return is_input_of_tables(inputs[static_cast<std::size_t>(input)].name); });
 }
 
+/// The same of a base along axes that turn with the arm: over its angle as well, in steps that turn as evenly.
+static std::vector<LookupTable> tables_of_turning(const Explanation& candidate, const Eigen::VectorXd& coefficients,
+                                                  const std::vector<InputColumn>& inputs) {
+  constexpr double kStep = 5.0 * kPi / 180.0;  ///< between lines a circle's chords are off by 0.1 %
+  const InputColumn& angle = inputs[static_cast<std::size_t>(candidate.turning.angle)];
+  const auto [low, high] = std::minmax_element(angle.values.begin(), angle.values.end());
+  const auto steps = static_cast<int>(std::ceil((*high - *low) / kStep));
+  LookupTable table{"", {angle.name}, {{}}, {}};
+  for (int k = 0; k <= steps; ++k) table.knots[0].push_back(*low + (*high - *low) * k / steps);
+  table.inputs.push_back(inputs[static_cast<std::size_t>(candidate.inputs[0])].name);
+  table.knots.push_back(candidate.knots[0]);
+  const auto hats = static_cast<Eigen::Index>(candidate.knots[0].size());
+  std::vector<LookupTable> out;
+  const std::vector<std::string> sites = frame_coordinates(candidate.site);
+  for (std::size_t coordinate = 0; coordinate < sites.size(); ++coordinate) {
+    table.site = sites[coordinate];
+    table.values.clear();
+    for (const double at : table.knots[0]) {
+      const Eigen::RowVector3d along = turn_of(candidate.turning, at).row(static_cast<Eigen::Index>(coordinate % 3));
+      for (Eigen::Index hat = 0; hat < hats; ++hat) {
+        double value = 0.0;
+        for (Eigen::Index k = 0; k < 3; ++k)
+          value += along[k] * coefficients[(static_cast<Eigen::Index>(coordinate / 3) * 3 + k) * hats + hat];
+        table.values.push_back(value);
+      }
+    }
+    out.push_back(table);
+  }
+  return out;
+}
+
 std::vector<LookupTable> tables_of(const Explanation& candidate, const Eigen::VectorXd& coefficients,
                                    const std::vector<InputColumn>& inputs, const Robot& robot) {
+  if (candidate.turning.angle >= 0) return tables_of_turning(candidate, coefficients, inputs);
   LookupTable table{"", {}, candidate.knots, {}};
   for (const int input : candidate.inputs) table.inputs.push_back(inputs[static_cast<std::size_t>(input)].name);
   Eigen::Index hats = 1;

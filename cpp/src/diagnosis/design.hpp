@@ -37,6 +37,8 @@ struct Design {
   std::vector<int> nuisance;
   std::vector<std::vector<int>> joint_column;  ///< per joint: the column of its motion (offset); empty: none
   std::vector<int> base_columns;               ///< of the six frame coordinates
+  std::vector<int> turning_base_columns;       ///< of the same along axes that turn with the arm; empty: none
+  TurningBase turning_base;
   Candidates candidates;
 
   int column(const std::string& name) const;

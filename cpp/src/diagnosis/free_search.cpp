@@ -84,6 +84,7 @@ class TrialMaker {
       if (only_of_.empty()) add_two_inputs(robot.joints[joint].name, joint);
     }
     if (!design_.base_columns.empty()) add_base();
+    if (!design_.turning_base_columns.empty()) add_turning_base();
     return std::move(out_);
   }
 
@@ -135,14 +136,27 @@ class TrialMaker {
     }
   }
 
-  void add(const std::string& site, const std::vector<int>& columns, const std::vector<int>& which) {
+  /// The base towards the arm: what leans under a load does so on the side on which the arm holds it.
+  void add_turning_base() {
+    for (int a = 0; a < count(); ++a) {
+      const InputColumn& of = input(a);
+      if (of.constant || a == design_.turning_base.angle || is_direction(of) || is_difference(of) || is_time(of) ||
+          !is_wanted(a))
+        continue;
+      add("base", design_.turning_base_columns, {a}, design_.turning_base);
+    }
+  }
+
+  void add(const std::string& site, const std::vector<int>& columns, const std::vector<int>& which,
+           const TurningBase& turning = {}) {
     Trial trial;
+    trial.what.turning = turning;
     trial.what.kind = Explanation::Kind::free;
     trial.what.effect = kNoEffect;
     trial.what.site = site;
     if (site != "base") trial.what.joints = {site};
     trial.what.inputs = which;
-    std::string name = "free." + site;
+    std::string name = "free." + site + (turning.angle < 0 ? "" : ".turning");
     for (const int k : which) {
       trial.what.knots.push_back((which.size() > 1 ? coarse_ : fine_)[static_cast<std::size_t>(k)]);
       if (trial.what.knots.back().size() < 2) return;
