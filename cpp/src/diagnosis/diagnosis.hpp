@@ -302,6 +302,11 @@ double best_local_shape(const Work& work, const Evidence& evidence, const Eviden
 /// function with knots, a step, a corner or a bump.
 bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int angle);
 
+/// What a joint that moves with an angle, its own or another one's, would win: by waves of the first three orders or by
+/// knots, whichever is likelier [nats].
+double best_function(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
+                     int angle);
+
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 
 bool same_name(const Explanation& a, const Explanation& b);

@@ -13,6 +13,7 @@ namespace truing::diagnosis {
 namespace {
 
 constexpr int kPlaces = 20;
+constexpr int kKnots = 8, kFineKnots = 16;
 constexpr std::size_t kValuesSeen = 6000;  ///< looked at: of more, whole folds are left out
 
 /// One shape at a place, as a function of the input.
@@ -91,6 +92,18 @@ class Beside {
     return evidence_of(knots.size(), [&](double x, double* out) { hats_at(knots, x, out); });
   }
 
+  /// A constant and waves of the first orders of an angle.
+  double evidence_of_waves() const {
+    constexpr int kOrder = 3;
+    return evidence_of(1 + 2 * kOrder, [](double q, double* out) {
+      *out++ = 1.0;
+      for (int k = 1; k <= kOrder; ++k) {
+        *out++ = std::cos(k * q);
+        *out++ = std::sin(k * q);
+      }
+    });
+  }
+
  private:
   const InputColumn& along_;
   const Evidence& evidence_;
@@ -120,17 +133,16 @@ double best_local_shape(const Work& work, const Evidence& evidence, const Eviden
 }
 
 bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int angle) {
-  constexpr int kOrder = 3, kKnots = 8, kFineKnots = 16;
   const Beside beside(work, evidence, state, joint, angle);
-  const double by_waves = beside.evidence_of(1 + 2 * kOrder, [](double q, double* out) {
-    *out++ = 1.0;
-    for (int k = 1; k <= kOrder; ++k) {
-      *out++ = std::cos(k * q);
-      *out++ = std::sin(k * q);
-    }
-  });
+  const double by_waves = beside.evidence_of_waves();
   return by_waves > beside.evidence_of_knots(kKnots) && by_waves > beside.evidence_of_knots(kFineKnots) &&
          by_waves > best_shape(beside);
+}
+
+double best_function(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
+                     int angle) {
+  const Beside beside(work, evidence, state, joint, angle);
+  return std::max({beside.evidence_of_waves(), beside.evidence_of_knots(kKnots), beside.evidence_of_knots(kFineKnots)});
 }
 
 }  // namespace truing::diagnosis

@@ -271,6 +271,29 @@ static std::vector<int> left_by_warmth(const Work& work, const Evidence& evidenc
   return out;
 }
 
+/// Joints whose motion the law of a joint is a function of, other than that joint.
+static bool is_moved_by(const Work& work, const Explanation& law, const Explanation& other) {
+  if (effect_traits(work, law).driver != Driver::other_angles || law.joints.size() != 1 || other.joints.size() != 1)
+    return false;
+  return other.joints != law.joints &&
+         std::any_of(law.parameters.begin(), law.parameters.end(),
+                     [&](const std::string& name) { return name.substr(name.rfind('.') + 1) == other.joints[0]; });
+}
+
+/// A joint that another one carries along, by a law that is not the simple one: what that leaves goes with the other
+/// joint's angle, and looks like a law of that one's own. Held against any such motion of the joint that is carried.
+static bool is_left_by_coupling(const Work& work, const Evidence& evidence, const Decision& decision, int group,
+                                const Explanation& small, const Explanation& law) {
+  if (!follows_own_angle(effect_traits(work, small)) || !is_moved_by(work, law, small)) return false;
+  const Robot& robot = work.given.frames.robot;
+  const int angle = input_named(work, input_name(Driver::angle, robot.joint_index(small.joints[0])));
+  if (angle < 0) return false;
+  const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, {group}));
+  const double by_name = evidence.gain(rest, columns_of_groups(work, {group}), 0.0).evidence;
+  const double by_law = best_function(work, evidence, rest, robot.joint_index(law.joints[0]), angle);
+  return by_name < by_law + decision.search.threshold;
+}
+
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision) {
   const auto named = [&](int g) -> const Explanation& {
     return work.design.candidates.named[static_cast<std::size_t>(g)];
@@ -287,7 +310,9 @@ std::map<int, int> departures_from_laws(const Work& work, const Evidence& eviden
     for (std::size_t small = large + 1; small < laws.size(); ++small) {
       const auto [less_size, less] = laws[small];
       if (out.count(group) || out.count(less) || !(less_size < size)) continue;
-      if (is_departure(work, named(less), named(group), less_size / size)) out[less] = group;
+      if (is_departure(work, named(less), named(group), less_size / size) ||
+          is_left_by_coupling(work, evidence, decision, less, named(less), named(group)))
+        out[less] = group;
       if (may_be_warmth(work, named(less), named(group))) warmth.push_back(less);
     }
     for (const int g : left_by_warmth(work, evidence, decision, warmth, named(group))) out[g] = group;
