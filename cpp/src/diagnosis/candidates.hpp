@@ -24,10 +24,12 @@ constexpr const char* kFrame[6] = {"x", "y", "z", "rx", "ry", "rz"};
 /// In place of an effect's name: a function of what was recorded, and of no known cause.
 constexpr const char* kNoEffect = "free";
 
-/// The base seen from where the arm stands: its axes turn about `axis` with the joint that turns the arm.
+/// The base seen from where the arm stands: axes that turn with the joint that turns the arm. Of six coordinates, three
+/// shifts and three turns, the last of each three is along that joint's axis.
 struct TurningBase {
   int angle = -1;  ///< index in make_inputs of that joint's angle; -1: no joint turns the arm as a whole
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of it, in the measurement frame
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< where that joint stands at zero, in the measurement frame
+  std::vector<int> coordinates{0, 1, 2, 3, 4, 5};      ///< those that move
 };
 
 /// One candidate, as the user reads it and as `identify` is asked for it.
@@ -48,7 +50,7 @@ struct Explanation {
   std::vector<int> inputs;  ///< indices of make_inputs
   std::vector<std::vector<double>> knots;
   LawTest law_test = LawTest::of_driver;  ///< kind law: which function its columns are
-  TurningBase turning{};                  ///< kind free, at the base: its coordinates are those of axes that turn
+  TurningBase turning{};                  ///< kind free, at the base: along axes that turn with the arm
 };
 
 /// A candidate that is a free function of time from the start, be it named or not.

@@ -450,13 +450,53 @@ static std::string unrecorded_cause(const Work& work, const Explanation& e) {
   return "";
 }
 
+/// What a place and its inputs say already.
+static std::string plainly(const std::string& site, const std::vector<std::string>& inputs) {
+  if (site == "base") return "the base moves as a function of " + listed(inputs);
+  return inputs.size() == 2 ? "depends on both " + inputs[0] + " and " + inputs[1] : "";
+}
+
+/// Inputs of a free function, as the user reads them.
+static std::vector<std::string> names_of_inputs(const Work& work, const Explanation& e) {
+  std::vector<std::string> out;
+  if (e.turning.angle >= 0) out.push_back(work.inputs[static_cast<std::size_t>(e.turning.angle)].name);
+  for (const int input : e.inputs) out.push_back(work.inputs[static_cast<std::size_t>(input)].name);
+  return out;
+}
+
+/// "; or J2 as a function of payload": the best function at every other joint, or the base, that these data do not tell
+/// from the one that was taken, or that plainly makes the same motion.
+static std::string other_places(const Work& work, const Evidence& evidence, const Evidence::State& less, double sigma2,
+                                int group) {
+  constexpr double kNats = 3.0;
+  constexpr int kPlain = 8;  ///< parameters: more explain much of any motion
+  const Explanation& mine = work.design.candidates.named[static_cast<std::size_t>(group)];
+  FreeScanOptions options;
+  options.flips = 0;
+  const FreeScan scan =
+      scan_free(work.design, evidence, less, work.inputs, work.given.frames.robot, work.noise.design_effect, options);
+  Evidence::Gain own = evidence.gain(less, columns_of_groups(work, {group}), 0.0);
+  for (const FreeGain& found : scan.best)
+    if (found.what.site == mine.site && found.gain.evidence > own.evidence) own = found.gain;
+  const auto is_as_good = [&](const Evidence::Gain& other) {
+    const bool is_same_motion = other.rank <= kPlain && own.squares - other.squares < 2.0 * kNats * sigma2;
+    return other.evidence > own.evidence - kNats || is_same_motion;
+  };
+  std::string out;
+  std::set<std::string> said = {mine.site};
+  for (const FreeGain& found : scan.best) {
+    if (!is_as_good(found.gain) || !said.insert(found.what.site).second) continue;
+    out += "; or " + found.what.site + " as a function of " + listed(names_of_inputs(work, found.what));
+  }
+  return out.empty() ? "" : out + ": these poses do not tell which";
+}
+
 UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const Decision& decision, std::size_t at) {
   const int g = decision.state.choice.groups[at];
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
   UnknownEffect out;
   out.joint = e.site;
-  if (e.turning.angle >= 0) out.inputs.push_back(work.inputs[static_cast<std::size_t>(e.turning.angle)].name);
-  for (const int input : e.inputs) out.inputs.push_back(work.inputs[static_cast<std::size_t>(input)].name);
+  out.inputs = names_of_inputs(work, e);
   const Shrinkage shrinkage = shrinkage_by(work, evidence, decision, at);
   out.held_out_before = shrinkage.before;
   out.held_out_after = shrinkage.after;
@@ -471,7 +511,7 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   if (e.site != "base")
     sites = work.design.joint_column[work.given.frames.robot.joint_index(e.site)];
   else if (e.turning.angle >= 0)
-    sites = {work.design.turning_base_columns.begin() + 3, work.design.turning_base_columns.end()};
+    sites = {work.design.turning_base_columns[3], work.design.turning_base_columns[4]};
   else if (sites.size() > 3)
     sites.resize(3);
   for (const int site : sites) {
@@ -479,11 +519,13 @@ UnknownEffect describe_unknown(const Work& work, const Evidence& evidence, const
   }
   if (!out.curves.empty() && e.inputs.size() == 1 && e.site != "base")
     out.looks_like = shape_of(out.curves[0]) + unrecorded_cause(work, e);
-  if (out.inputs.size() == 2) out.looks_like = "depends on both " + out.inputs[0] + " and " + out.inputs[1];
-  if (e.site == "base") out.looks_like = "the base moves as a function of " + out.inputs[0];
+  if (out.looks_like.empty()) out.looks_like = plainly(e.site, out.inputs);
   if (e.turning.angle >= 0)
-    out.looks_like = "the base, or the bearing of " + out.inputs[0] +
-                     ", gives way towards where the arm points, as a function of " + out.inputs[1];
+    out.looks_like =
+        "the base, or the bearing of the joint that turns the arm, gives way towards the arm, as a function of " +
+        out.inputs[1];
+  if (e.kind == Kind::free && decision.corrects.count(g) == 0)
+    out.looks_like += other_places(work, evidence, less, decision.state.sigma2, g);
   return out;
 }
 
@@ -697,7 +739,7 @@ static std::string unknown_in_words(const Diagnosis& d) {
          (of_two                   ? u.inputs[0] + " and " + u.inputs[1]
           : u.inputs[0] == "order" ? std::string("the order of the rows")
                                    : listed(u.inputs)) +
-         (u.looks_like.empty() || of_two || u.joint == "base" ? "" : " (" + u.looks_like + ")") + ".";
+         (u.looks_like == plainly(u.joint, u.inputs) ? "" : " (" + u.looks_like + ")") + ".";
 }
 
 bool too_few_poses(const Diagnosis& d) {

@@ -37,7 +37,7 @@ double root_mean_square(const std::vector<double>& values, const std::vector<std
 
 /// From axes that turn with the arm to the fixed ones, where the joint that turns it stands at `angle`.
 Eigen::Matrix3d turn_of(const TurningBase& base, double angle) {
-  return Eigen::AngleAxisd(angle, base.axis).toRotationMatrix();
+  return Eigen::AngleAxisd(angle, base.axes.col(2)) * base.axes;
 }
 
 /// Approach directions of the joint that an input belongs to; absent: they were not recorded.
@@ -389,7 +389,10 @@ class Designer {
       for (std::size_t k = 0; k < task_.inputs.size(); ++k)
         if (task_.inputs[k].name == angle && !task_.inputs[k].constant) out.angle = static_cast<int>(k);
       const Eigen::VectorXd zero = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(task_.data.joints.size()));
-      out.axis = joint_axis(task_.at, forward_kinematics(task_.at, zero, 0), joint).direction;
+      const Eigen::Vector3d axis = joint_axis(task_.at, forward_kinematics(task_.at, zero, 0), joint).direction;
+      out.axes.col(0) = axis.unitOrthogonal();
+      out.axes.col(1) = axis.cross(out.axes.col(0));
+      out.axes.col(2) = axis;
       break;
     }
     return out;
@@ -486,20 +489,34 @@ std::function<double(const Inputs&)> function_of(const Explanation& candidate, c
   };
 }
 
-/// One coordinate of a base, along fixed axes, as a function along axes that turn with the arm: from the hats'
-/// coefficients of its three translations, or three rotations.
+/// One coordinate of the base, along fixed axes: what the coordinates along axes that turn with the arm make of it, at
+/// an angle.
+Eigen::VectorXd turned_into(int coordinate, const TurningBase& base, double angle) {
+  const Eigen::Matrix3d turn = turn_of(base, angle);
+  Eigen::VectorXd out(static_cast<Eigen::Index>(base.coordinates.size()));
+  for (Eigen::Index k = 0; k < out.size(); ++k) {
+    const int from = base.coordinates[static_cast<std::size_t>(k)];
+    out[k] = from / 3 == coordinate / 3 ? turn(coordinate % 3, from % 3) : 0.0;
+  }
+  return out;
+}
+
+/// That coordinate as a function of the inputs.
 std::function<double(const Inputs&)> function_of_turning(const Explanation& candidate,
                                                          const Eigen::VectorXd& coefficients,
                                                          const std::vector<InputColumn>& inputs, int coordinate) {
   std::vector<std::function<double(const Inputs&)>> along;
   const std::size_t hats = candidate.knots[0].size();
-  for (int k = 0; k < 3; ++k)
-    along.push_back(
-        function_of(candidate, coefficients, inputs, static_cast<std::size_t>(coordinate / 3 * 3 + k) * hats, 1.0, {}));
+  for (std::size_t k = 0; k < candidate.turning.coordinates.size(); ++k)
+    along.push_back(function_of(candidate, coefficients, inputs, k * hats, 1.0, {}));
   const std::vector<double>* angle = &inputs[static_cast<std::size_t>(candidate.turning.angle)].values;
-  return [=, turning = candidate.turning](const Inputs& in) {
-    const Eigen::Vector3d value(along[0](in), along[1](in), along[2](in));
-    return turn_of(turning, (*angle)[in.row]).row(coordinate % 3).dot(value);
+  return [=, base = candidate.turning](const Inputs& in) {
+    const Eigen::VectorXd times = turned_into(coordinate, base, (*angle)[in.row]);
+    double out = 0.0;
+    for (std::size_t k = 0; k < along.size(); ++k) {
+      if (times[static_cast<Eigen::Index>(k)] != 0.0) out += times[static_cast<Eigen::Index>(k)] * along[k](in);
+    }
+    return out;
   };
 }
 
@@ -614,14 +631,11 @@ static std::vector<LookupTable> tables_of_turning(const Explanation& candidate, 
     table.site = sites[coordinate];
     table.values.clear();
     for (const double at : table.knots[0]) {
-      const Eigen::RowVector3d along = turn_of(candidate.turning, at).row(static_cast<Eigen::Index>(coordinate % 3));
-      for (Eigen::Index hat = 0; hat < hats; ++hat) {
-        double value = 0.0;
-        for (Eigen::Index k = 0; k < 3; ++k)
-          value += along[k] * coefficients[(static_cast<Eigen::Index>(coordinate / 3) * 3 + k) * hats + hat];
-        table.values.push_back(value);
-      }
+      const Eigen::VectorXd times = turned_into(static_cast<int>(coordinate), candidate.turning, at);
+      const Eigen::VectorXd values = Eigen::Map<const Eigen::MatrixXd>(coefficients.data(), hats, times.size()) * times;
+      table.values.insert(table.values.end(), values.begin(), values.end());
     }
+    if (std::all_of(table.values.begin(), table.values.end(), [](double value) { return value == 0.0; })) continue;
     out.push_back(table);
   }
   return out;

@@ -136,14 +136,22 @@ class TrialMaker {
     }
   }
 
-  /// The base towards the arm: what leans under a load does so on the side on which the arm holds it.
+  /// The base towards the arm: what leans under a load does so on the side on which the arm holds it. It tilts, or
+  /// moves in any way.
   void add_turning_base() {
+    TurningBase tilting = design_.turning_base;
+    tilting.coordinates = {3, 4};
     for (int a = 0; a < count(); ++a) {
       const InputColumn& of = input(a);
-      if (of.constant || a == design_.turning_base.angle || is_direction(of) || is_difference(of) || is_time(of) ||
-          !is_wanted(a))
+      const bool is_its_angle = a == design_.turning_base.angle;
+      if (of.constant || is_its_angle || is_direction(of) || is_difference(of) || is_time(of) || !is_wanted(a))
         continue;
-      add("base", design_.turning_base_columns, {a}, design_.turning_base);
+      for (const TurningBase& base : {tilting, design_.turning_base}) {
+        std::vector<int> columns;
+        for (const int k : base.coordinates)
+          columns.push_back(design_.turning_base_columns[static_cast<std::size_t>(k)]);
+        add("base", columns, {a}, base);
+      }
     }
   }
 
@@ -156,7 +164,7 @@ class TrialMaker {
     trial.what.site = site;
     if (site != "base") trial.what.joints = {site};
     trial.what.inputs = which;
-    std::string name = "free." + site + (turning.angle < 0 ? "" : ".turning");
+    std::string name = "free." + site + (turning.angle < 0 ? "" : columns.size() == 2 ? ".tilting" : ".turning");
     for (const int k : which) {
       trial.what.knots.push_back((which.size() > 1 ? coarse_ : fine_)[static_cast<std::size_t>(k)]);
       if (trial.what.knots.back().size() < 2) return;
