@@ -450,10 +450,15 @@ static std::string unrecorded_cause(const Work& work, const Explanation& e) {
   return "";
 }
 
+/// "q1 and payload".
+static std::string in_a_row(const std::vector<std::string>& inputs) {
+  return inputs.size() == 2 ? inputs[0] + " and " + inputs[1] : listed(inputs);
+}
+
 /// What a place and its inputs say already.
 static std::string plainly(const std::string& site, const std::vector<std::string>& inputs) {
-  if (site == "base") return "the base moves as a function of " + listed(inputs);
-  return inputs.size() == 2 ? "depends on both " + inputs[0] + " and " + inputs[1] : "";
+  if (site == "base") return "the base moves as a function of " + in_a_row(inputs);
+  return inputs.size() == 2 ? "depends on both " + in_a_row(inputs) : "";
 }
 
 /// Inputs of a free function, as the user reads them.
@@ -486,7 +491,7 @@ static std::string other_places(const Work& work, const Evidence& evidence, cons
   std::set<std::string> said = {mine.site};
   for (const FreeGain& found : scan.best) {
     if (!is_as_good(found.gain) || !said.insert(found.what.site).second) continue;
-    out += "; or " + found.what.site + " as a function of " + listed(names_of_inputs(work, found.what));
+    out += "; or " + found.what.site + " as a function of " + in_a_row(names_of_inputs(work, found.what));
   }
   return out.empty() ? "" : out + ": these poses do not tell which";
 }
@@ -734,11 +739,8 @@ static std::string unknown_in_words(const Diagnosis& d) {
     return " Repeats show a noise of " + millimetres(d.noise_floor) +
            ": something is there that no function of what was recorded describes.";
   }
-  const bool of_two = u.inputs.size() == 2;
   return " Unknown: " + (u.joint.empty() ? std::string("something") : u.joint) + " moves as a function of " +
-         (of_two                   ? u.inputs[0] + " and " + u.inputs[1]
-          : u.inputs[0] == "order" ? std::string("the order of the rows")
-                                   : listed(u.inputs)) +
+         (u.inputs[0] == "order" && u.inputs.size() == 1 ? std::string("the order of the rows") : in_a_row(u.inputs)) +
          (u.looks_like == plainly(u.joint, u.inputs) ? "" : " (" + u.looks_like + ")") + ".";
 }
 

@@ -556,6 +556,83 @@ TEST_CASE("what a law leaves of its own joint's motion is no second cause, and i
   CHECK(bars.after.rms < 1.2 * bars.noise_floor);
 }
 
+/// The base leans by `lean` [rad] towards where the first joint points, about the base's origin.
+Effect leaning_base(const std::function<double(const Inputs&)>& lean) {
+  Effect effect;
+  effect.name = "hidden lean";
+  effect.per_joint = false;
+  effect.terms = [lean](const Robot& robot, std::size_t, const truing::Measurements&) {
+    const Eigen::Matrix3d base = robot.T_measurement_base.linear();
+    std::vector<Term> terms;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      Term term;
+      term.parameter = "hidden lean.size";
+      term.unit = "rad";
+      term.site = std::string("base.r") + "xyz"[k];
+      term.basis = [=](const Inputs& in) {
+        const double q = in.joints[0];
+        return lean(in) * (base * Eigen::Vector3d(-std::sin(q), std::cos(q), 0.0))[k];
+      };
+      terms.push_back(term);
+    }
+    return terms;
+  };
+  return effect;
+}
+
+TEST_CASE(
+    "a base that leans under its load is said to, and no next joint; a joint that gives way under it stays that") {
+  const auto load = [](const Inputs& in) { return 3e-4 * in.data->payload[in.row]; };
+  const Conditions carrying{false, {}, [](std::size_t row) { return static_cast<double>(row % 3); }};
+  Robot light = arm();
+  for (Joint& j : light.joints) j.mass.reset();
+  const auto leant = measured(light, {leaning_base(load)}, 200, 1310, carrying);
+  const Diagnosis d = diagnose(light, leant->data);
+  INFO(names(d));
+  REQUIRE(d.unknown.size() == 1);
+  CHECK(d.unknown[0].joint == "base");
+  CHECK(d.unknown[0].inputs == std::vector<std::string>{"q1", "payload"});
+  CHECK(d.unknown[0].looks_like.find("; or ") == std::string::npos);
+  CHECK(d.effects.empty());
+  CHECK(d.after_unknown.rms < 1.1 * d.noise_floor);
+  REQUIRE(d.robot_with_unknown);  // over the turn of the first joint, as tables
+  CHECK(d.after_robot_with_unknown.rms < 1.1 * d.noise_floor);
+  const auto given_way = measured(light, {hidden("J2", load)}, 200, 1320, carrying);
+  const Diagnosis at_joint = diagnose(light, given_way->data);
+  INFO(names(at_joint));
+  REQUIRE(at_joint.unknown.size() == 1);
+  CHECK(at_joint.unknown[0].joint == "J2");
+  CHECK(at_joint.unknown[0].inputs == std::vector<std::string>{"payload"});
+}
+
+TEST_CASE("where the second axis runs through the base's origin, a lean and a turn of it are both said") {
+  const auto load = [](const Inputs& in) { return 3e-4 * in.data->payload[in.row]; };
+  const Conditions carrying{false, {}, [](std::size_t row) { return static_cast<double>(row % 3); }};
+  Robot low = arm();
+  low.joints[0].d = 0.0;
+  for (Joint& j : low.joints) j.mass.reset();
+  const auto table = measured(low, {leaning_base(load)}, 200, 1330, carrying);
+  const Diagnosis d = diagnose(low, table->data);
+  INFO(names(d));
+  REQUIRE(d.unknown.size() == 1);
+  const truing::UnknownEffect& u = d.unknown[0];
+  INFO(u.looks_like);
+  CHECK(u.joint == "J2");
+  CHECK(u.looks_like.find("; or base as a function of q1 and payload: these poses do not tell which") !=
+        std::string::npos);
+  CHECK(d.sentence.find("or base as a function of q1 and payload") != std::string::npos);
+}
+
+TEST_CASE("a wave of the joint that carries another one along is a cause of its own beside the coupling") {
+  const auto wave = hidden("J4", [](const Inputs& in) { return 4e-4 * std::sin(2.0 * in.joints[3]); });
+  const auto carried = hidden("J3", [](const Inputs& in) { return 1.5e-3 * in.joints[3]; });
+  const auto table = measured(arm(), {carried, wave}, 250, 1340);
+  const Diagnosis d = diagnose(arm(), table->data);
+  INFO(names(d));
+  CHECK(is_named(d, "neighbour_coupling", {"J3"}));
+  CHECK(is_named(d, "harmonic", {"J4"}));
+}
+
 TEST_CASE("diagnose finds none of the laws of machines in noise" * doctest::skip(kSanitized)) {
   const auto warm = [](std::size_t row) { return 26.0 - 4.0 * std::cos(0.03 * static_cast<double>(row)); };
   const auto heavy = [](std::size_t row) { return row % 2 ? 3.0 : 0.0; };

@@ -93,3 +93,24 @@ def test_a_robot_that_warms_late_is_neither_a_frame_that_drifts_nor_a_wrong_metr
     assert (found.effects[0].effect, found.effects[0].joints) == ("thermal", ())
     assert "what it leaves looks like" in found.effects[0].note
     assert not {"drift", "scale"} & {e.effect for e in found.effects}
+
+
+@pytest.mark.parametrize(("which", "joint", "mover"), [("10@9913", "B2", "B3"), ("22@9914", "J1", "J2")])
+def test_what_a_coupling_of_another_form_leaves_is_no_law_of_the_joint_that_moves_it(
+    which: str, joint: str, mover: str
+) -> None:
+    """A harmonic of B3 with .96, a bearing of J2 that is not round with 1.00."""
+    robot, data, _ = make(f"examination/machines/{which}")
+    found = truing.diagnose(robot, data)
+    assert ("neighbour_coupling", (joint,)) in [(e.effect, e.joints) for e in found.effects]
+    assert not [e for e in found.effects if e.joints == (mover,)]
+
+
+@pytest.mark.parametrize("number", [8, 17, 26, 35, 44])
+def test_a_base_that_leans_under_the_payload_is_said_to(number: int) -> None:
+    """It was an unknown of the payload at the next joint."""
+    robot, data, label = make(f"examination/unlisted/{number}@41")
+    assert label["unlisted"] == "leaning_base"
+    found = truing.diagnose(robot, data)
+    assert [(u.joint, list(u.inputs)) for u in found.unknown] == [("base", label["unlisted_inputs"])]
+    assert not [e for e in found.effects if e.probability > 0.9]
