@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Names that together stand for one function: laws of one joint's angle, or a frame that wanders, which one
-// function of what they depend on explains as well. Taken one by one each of them holds, for the others make up for
-// what it lacks.
+// Names that together stand for one function: laws of one joint's angle, a frame that wanders, or parts that give way
+// under weight, which one function of what they depend on explains as well. Taken one by one each of them holds, for
+// the others make up for what it lacks.
 
 #include <algorithm>
 
@@ -27,7 +27,7 @@ struct Bundle {
   std::vector<int> groups;
   std::vector<int> inputs;
   std::size_t names = 0;  ///< of `groups`, without what corrects them
-  int joint = -1;         ///< where all of them act; -1: at the base
+  int joint = -1;         ///< where all of them act; -1: at no one joint
 };
 
 /// Laws of one joint's own angle, with what corrects them. A single one is held against functions where its confidence
@@ -68,9 +68,32 @@ Bundle wandering_frame(const Work& work, const Choice& choice) {
   return out;
 }
 
-/// Of a joint; -1: of the base. No groups: there is nothing to question.
+/// Joints and links that give way under their weights, with what corrects them: together they make much of what one
+/// place does under the payload.
+Bundle laws_of_weight(const Work& work, const Choice& choice) {
+  Bundle out;
+  const int payload = input_named(work, "payload");
+  if (payload < 0 || work.inputs[static_cast<std::size_t>(payload)].constant) return out;
+  const auto is_torque = [&](int k) { return work.inputs[static_cast<std::size_t>(k)].name.rfind("torque", 0) == 0; };
+  for (const int g : choice.groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    const bool is_function = e.kind == Kind::law || e.kind == Kind::free;
+    if (is_function ? std::any_of(e.inputs.begin(), e.inputs.end(), is_torque)
+                    : effect_traits(work, e).driver == Driver::gravity_torque)
+      out.groups.push_back(g);
+    out.names += !is_function && effect_traits(work, e).driver == Driver::gravity_torque;
+  }
+  if (out.names < 2) out.groups.clear();
+  out.inputs = {payload};
+  return out;
+}
+
+constexpr int kFrame = -1, kWeight = -2;  ///< in place of a joint
+
+/// Of a joint, of the frame, or of weights. No groups: there is nothing to question.
 Bundle bundle_at(const Work& work, const Choice& choice, int joint) {
-  return joint < 0 ? wandering_frame(work, choice) : laws_of_angle(work, choice, static_cast<std::size_t>(joint));
+  if (joint == kWeight) return laws_of_weight(work, choice);
+  return joint == kFrame ? wandering_frame(work, choice) : laws_of_angle(work, choice, static_cast<std::size_t>(joint));
 }
 
 /// The best function in a bundle's place.
@@ -124,7 +147,7 @@ bool put_in_its_place(Work* work, const Robot& robot, const Evidence::State& res
 }  // namespace
 
 void question_bundles(Work* work, const Robot& robot, Decision* decision) {
-  for (int joint = -1; joint < static_cast<int>(work->design.joint_column.size()); ++joint) {
+  for (int joint = kWeight; joint < static_cast<int>(work->design.joint_column.size()); ++joint) {
     const Bundle bundle = bundle_at(*work, decision->state.choice, joint);
     if (bundle.groups.empty() || bundle.inputs.empty()) continue;
     const Evidence evidence = evidence_now(*work);
