@@ -148,6 +148,46 @@ static bool is_law_in_question(const Work& work, const Evidence& evidence, const
   return false;
 }
 
+/// A joint, and the angle that a law moves it with.
+struct MovedBy {
+  std::size_t joint;
+  int angle;  ///< of the inputs
+};
+
+/// Of laws of a joint's own angle, and of joints that others carry along.
+static std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name) {
+  std::vector<MovedBy> out;
+  const EffectTraits& traits = effect_traits(work, name);
+  if (name.kind != Kind::catalogue || name.period > 0.0 || traits.stands_for == StandsFor::link_geometry) return out;
+  const std::vector<Joint>& joints = work.given.frames.robot.joints;
+  const auto add = [&](std::size_t joint, std::size_t mover) {
+    const int angle = input_named(work, input_name(Driver::angle, mover));
+    if (angle >= 0) out.push_back({joint, angle});
+  };
+  for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+    if (follows_own_angle(traits) && name.joints == std::vector<std::string>{joints[joint].name}) add(joint, joint);
+    for (std::size_t mover = 0; mover < joints.size() && traits.driver == Driver::other_angles; ++mover) {
+      const std::string ratio = name.effect + "." + joints[joint].name + "." + joints[mover].name;
+      if (std::find(name.parameters.begin(), name.parameters.end(), ratio) != name.parameters.end()) add(joint, mover);
+    }
+  }
+  return out;
+}
+
+/// A function of the angle that a law moves a joint with wins much beside it: where this is too little to be found by
+/// itself, the name may be of a part of it.
+static bool is_law_part(const Work& work, const Evidence& evidence, const Evidence::State& state,
+                        const Contest& contest, int group) {
+  constexpr double kMuch = 0.125;  ///< of what both win; the function has paid for its knots
+  const double by_law = contest.removal_loss() + work.design.candidates.groups[static_cast<std::size_t>(group)].cost;
+  const std::vector<MovedBy> motions =
+      motions_of_law(work, work.design.candidates.named[static_cast<std::size_t>(group)]);
+  return std::any_of(motions.begin(), motions.end(), [&](const MovedBy& motion) {
+    const double beside = best_function(work, evidence, state, motion.joint, motion.angle);
+    return beside > kMuch * (by_law + beside);
+  });
+}
+
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at) {
   constexpr double kTempered = 0.5;  // no model is exact: half a nat counts for one
   const Contest contest(work, evidence, state, at);
@@ -156,6 +196,7 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
   const int group = state.choice.groups[at];
   out.law_in_question = is_law_in_question(work, evidence, state, contest, group) ||
                         is_shape_as_good(work, evidence, state, contest, group);
+  out.law_is_part = is_law_part(work, evidence, state, contest, group);
   double all = 1.0 + std::exp(-kTempered * std::max(0.0, out.removal_loss)), of_class = 1.0;
   for (const Evidence::Gain& gain : contest.gains()) {
     if (!contest.is_rival(gain.group)) continue;
@@ -271,26 +312,22 @@ static std::vector<int> left_by_warmth(const Work& work, const Evidence& evidenc
   return out;
 }
 
-/// Joints whose motion the law of a joint is a function of, other than that joint.
-static bool is_moved_by(const Work& work, const Explanation& law, const Explanation& other) {
-  if (effect_traits(work, law).driver != Driver::other_angles || law.joints.size() != 1 || other.joints.size() != 1)
-    return false;
-  return other.joints != law.joints &&
-         std::any_of(law.parameters.begin(), law.parameters.end(),
-                     [&](const std::string& name) { return name.substr(name.rfind('.') + 1) == other.joints[0]; });
-}
-
 /// A joint that another one carries along, by a law that is not the simple one: what that leaves goes with the other
 /// joint's angle, and looks like a law of that one's own. Held against any such motion of the joint that is carried.
 static bool is_left_by_coupling(const Work& work, const Evidence& evidence, const Decision& decision, int group,
                                 const Explanation& small, const Explanation& law) {
-  if (!follows_own_angle(effect_traits(work, small)) || !is_moved_by(work, law, small)) return false;
-  const Robot& robot = work.given.frames.robot;
-  const int angle = input_named(work, input_name(Driver::angle, robot.joint_index(small.joints[0])));
-  if (angle < 0) return false;
+  if (!follows_own_angle(effect_traits(work, small)) || small.joints.size() != 1 || small.joints == law.joints)
+    return false;
+  const int angle = input_named(work, input_name(Driver::angle, work.given.frames.robot.joint_index(small.joints[0])));
+  std::vector<MovedBy> carried = motions_of_law(work, law);
+  carried.erase(std::remove_if(carried.begin(), carried.end(), [&](const MovedBy& m) { return m.angle != angle; }),
+                carried.end());
+  if (carried.empty()) return false;
   const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, {group}));
+  double by_law = -1e300;
+  for (const MovedBy& motion : carried)
+    by_law = std::max(by_law, best_function(work, evidence, rest, motion.joint, motion.angle));
   const double by_name = evidence.gain(rest, columns_of_groups(work, {group}), 0.0).evidence;
-  const double by_law = best_function(work, evidence, rest, robot.joint_index(law.joints[0]), angle);
   return by_name < by_law + decision.search.threshold;
 }
 
@@ -430,7 +467,8 @@ std::vector<Ground> grounds_of(const Work& work, const Decision& decision, const
           {"found_again", selection_frequency(work, resampled, sure, group), 3.5},
           {"log_sure_fall", std::log(std::clamp(sure_fall(without, with), 1.0, kSureFall)), 1.8},
           {"unknown_found", unknown ? 1.0 : 0.0, -3.4},
-          {"law_in_question", in_question ? 1.0 : 0.0, -1.4}};
+          {"law_in_question", in_question ? 1.0 : 0.0, -1.4},
+          {"law_is_part", sure.law_is_part ? 1.0 : 0.0, -3.0}};
 }
 
 }  // namespace truing::diagnosis
