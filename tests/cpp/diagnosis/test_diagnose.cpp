@@ -510,7 +510,7 @@ TEST_CASE("diagnose finds a displacement by a column of one's own, unknown or wi
   REQUIRE(without.unknown.size() == 1);
   CHECK(without.unknown[0].joint == "J2");
   CHECK(without.unknown[0].inputs == std::vector<std::string>{"humidity"});
-  CHECK(without.unknown[0].looks_like == "linear in humidity");
+  CHECK(without.unknown[0].looks_like.find("linear in humidity") == 0);  // of J2, or of a base that leans
 
   truing::Effect swelling;
   swelling.name = "swelling";
