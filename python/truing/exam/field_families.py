@@ -244,13 +244,13 @@ def _machine_law(scene: Scene, kind: str, rng: Generator) -> Hidden | None:
             return None
         drivers = [driver for driver, _ in chain.drivers[passive[0]]]
         crank = drivers[:1] if rng.random() < 0.5 else drivers
-        named = tuple(f"q{chain.number(j)}" for j in crank)
+        named = tuple(chain.angle(j) for j in crank)
         return machine_laws.four_bar(chain, passive[0], [(j, 1.0) for j in crank], rng, named)
     if kind == "elbow_rods":
         elbow = turning[2]
         if not _parallel(chain, elbow):  # rods turn in one plane
             return None
-        named = (f"q{chain.number(elbow)}",)
+        named = (chain.angle(elbow),)
         return machine_laws.four_bar(chain, elbow, [(elbow, 1.0)], rng, named)
     if kind == "warm_robot":
         return machine_laws.warm_robot(chain, rng)
@@ -258,14 +258,14 @@ def _machine_law(scene: Scene, kind: str, rng: Generator) -> Hidden | None:
         joint = int(rng.choice(turning))
         beside = [j for j in turning if abs(j - joint) == 1]
         other = int(rng.choice(beside)) if beside else -1
-        return machine_laws.neighbour(joint, other, rng, (f"q{chain.number(other)}",)) if beside else None
+        return machine_laws.neighbour(joint, other, rng, (chain.angle(other),)) if beside else None
     places = places_of("axis_wobble" if kind == "wobble_twice" else "joint_compliance", scene)
     if not places:
         return None
     joint = int(rng.choice(places))
     if kind == "wobble_twice":
-        return replace(machine_laws.wobble_twice(joint, rng), inputs=(f"q{chain.number(joint)}",))
-    return replace(machine_laws.hard_spring(joint, rng), inputs=(f"torque{chain.number(joint)}",))
+        return replace(machine_laws.wobble_twice(joint, rng), inputs=(chain.angle(joint),))
+    return replace(machine_laws.hard_spring(joint, rng), inputs=(f"torque{joint + 1}",))
 
 
 def _parallel(chain: Chain, joint: int) -> bool:
@@ -284,11 +284,7 @@ def _short_elbow(plan: Plan, chain: Chain, rng: Generator) -> Plan:
 
 def _drags_the_wrist(scene: Scene, hidden: Hidden) -> bool:
     joint, chain = hidden.joints[0], scene.chain
-    return (
-        scene.specimen.wrist
-        and joint >= chain.joints - 2
-        and hidden.inputs == (f"q{chain.number(joint - 1)}",)
-    )
+    return scene.specimen.wrist and joint >= chain.joints - 2 and hidden.inputs == (chain.angle(joint - 1),)
 
 
 # ---- Several joints ------------------------------------------------------------------------------
@@ -407,7 +403,7 @@ def _teeth_of(request: Request, where: str) -> Case | None:
         return None
     complete, sizes = drawn
     names = scene.chain.names
-    places = [(names[j], [f"q{scene.chain.number(j)}"]) for j in joints]
+    places = [(names[j], [scene.chain.angle(j)]) for j in joints]
     spacing = {
         names[j]: float(np.diff(scene.plan.levels[scene.chain.driven.index(j)])[0])
         if where == "even_grid"

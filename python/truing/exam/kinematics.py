@@ -64,6 +64,10 @@ class Chain:
         """Place of a driven joint among the columns q1 ..., counted from 1."""
         return self.driven.index(joint) + 1
 
+    def angle(self, joint: int) -> str:
+        """What a diagnosis calls the joint's motion: by its number in the chain, passive joints counted."""
+        return f"q{joint + 1}"
+
 
 def chain_of(robot: truing.Robot) -> Chain:
     """A truing robot of convention dh or mdh as a chain; ratios and zeros are left out, examination robots

@@ -28,7 +28,7 @@ def _other(chain: Chain, joint: int, rng: Generator) -> int:
 
 
 def _name(chain: Chain, joint: int) -> str:
-    return f"q{chain.number(joint)}"
+    return chain.angle(joint)
 
 
 def _relative(c: Context, joint: int) -> Floats:
@@ -201,7 +201,7 @@ def loaded_belt(chain: Chain, joint: int, rng: Generator) -> Hidden:
         )
 
     return _unlisted(
-        "loaded_belt", joint, (f"dir{column + 1}", "payload"), values, frozenset({"dir", "payload"})
+        "loaded_belt", joint, (f"dir{joint + 1}", "payload"), values, frozenset({"dir", "payload"})
     )
 
 

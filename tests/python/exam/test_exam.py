@@ -1046,6 +1046,14 @@ def test_only_drift_may_be_named_where_the_frame_wanders() -> None:
     assert share([wandering("drift"), wandering("scale")], "alarm_other") == 0.5
 
 
+def test_inputs_of_an_unlisted_effect_are_called_as_a_diagnosis_calls_them() -> None:
+    """Of a palletizer, whose fourth joint is passive: the wrist's column is q4, its angle the chain's q5."""
+    robot, data, label = sets.make("examination/unlisted/109@9961")
+    assert (label["unlisted_joint"], label["unlisted_inputs"]) == ("J5", ["q5"])
+    found = truing.diagnose(robot, data)
+    assert [(u.joint, u.inputs) for u in found.unknown] == [("J5", ("q5",))]
+
+
 def test_joint_and_input_of_an_unlisted_effect() -> None:
     label = {"family": "unlisted", "size_over_noise": 4.0, "unlisted_joint": "J4", "unlisted_inputs": ["q4"]}
     found = [
