@@ -88,12 +88,13 @@ Bundle laws_of_weight(const Work& work, const Choice& choice) {
   return out;
 }
 
-constexpr int kFrame = -1, kWeight = -2;  ///< in place of a joint
+constexpr int kAnyFrame = -1, kAnyWeight = -2;  ///< in place of a joint
 
 /// Of a joint, of the frame, or of weights. No groups: there is nothing to question.
 Bundle bundle_at(const Work& work, const Choice& choice, int joint) {
-  if (joint == kWeight) return laws_of_weight(work, choice);
-  return joint == kFrame ? wandering_frame(work, choice) : laws_of_angle(work, choice, static_cast<std::size_t>(joint));
+  if (joint == kAnyWeight) return laws_of_weight(work, choice);
+  return joint == kAnyFrame ? wandering_frame(work, choice)
+                            : laws_of_angle(work, choice, static_cast<std::size_t>(joint));
 }
 
 /// The best function in a bundle's place.
@@ -147,7 +148,7 @@ bool put_in_its_place(Work* work, const Robot& robot, const Evidence::State& res
 }  // namespace
 
 void question_bundles(Work* work, const Robot& robot, Decision* decision) {
-  for (int joint = kWeight; joint < static_cast<int>(work->design.joint_column.size()); ++joint) {
+  for (int joint = kAnyWeight; joint < static_cast<int>(work->design.joint_column.size()); ++joint) {
     const Bundle bundle = bundle_at(*work, decision->state.choice, joint);
     if (bundle.groups.empty() || bundle.inputs.empty()) continue;
     const Evidence evidence = evidence_now(*work);
