@@ -114,3 +114,12 @@ def test_a_base_that_leans_under_the_payload_is_said_to(which: str) -> None:
     found = truing.diagnose(robot, data)
     assert [(u.joint, list(u.inputs)) for u in found.unknown] == [("base", label["unlisted_inputs"])]
     assert not [e for e in found.effects if e.probability > 0.9]
+
+
+@pytest.mark.parametrize("which", ["0@41", "27@41", "30@41"])
+def test_a_law_that_is_most_of_an_unknown_function_is_doubted(which: str) -> None:
+    """Two sawtooths and a switch, little above the noise: a harmonic of .97 and of .91, a coupling of .91."""
+    robot, data, label = make(f"examination/unlisted/{which}")
+    (named,) = truing.diagnose(robot, data).effects
+    assert label["unlisted"] in {"sawtooth", "neighbour_switch"}
+    assert named.grounds["law_is_part"] == 1.0 and named.probability < 0.7
