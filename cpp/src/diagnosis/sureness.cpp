@@ -319,16 +319,15 @@ static bool is_left_by_coupling(const Work& work, const Evidence& evidence, cons
   if (!follows_own_angle(effect_traits(work, small)) || small.joints.size() != 1 || small.joints == law.joints)
     return false;
   const int angle = input_named(work, input_name(Driver::angle, work.given.frames.robot.joint_index(small.joints[0])));
-  std::vector<MovedBy> carried = motions_of_law(work, law);
-  carried.erase(std::remove_if(carried.begin(), carried.end(), [&](const MovedBy& m) { return m.angle != angle; }),
-                carried.end());
-  if (carried.empty()) return false;
+  const std::vector<MovedBy> motions = motions_of_law(work, law);
+  const auto is_by_it = [&](const MovedBy& motion) { return motion.angle == angle; };
+  if (std::none_of(motions.begin(), motions.end(), is_by_it)) return false;
   const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, {group}));
-  double by_law = -1e300;
-  for (const MovedBy& motion : carried)
-    by_law = std::max(by_law, best_function(work, evidence, rest, motion.joint, motion.angle));
   const double by_name = evidence.gain(rest, columns_of_groups(work, {group}), 0.0).evidence;
-  return by_name < by_law + decision.search.threshold;
+  return std::any_of(motions.begin(), motions.end(), [&](const MovedBy& motion) {
+    return is_by_it(motion) &&
+           by_name < best_function(work, evidence, rest, motion.joint, motion.angle) + decision.search.threshold;
+  });
 }
 
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision) {
