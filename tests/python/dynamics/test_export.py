@@ -553,3 +553,50 @@ def test_bad_input_is_one_clear_message_and_leaves_nothing(tmp_path: Path) -> No
     with pytest.raises(truing.InputError, match="source is not used for mjcf"):
         export(robot, "mjcf", out, source=tmp_path / "source.urdf")
     assert not out.exists()
+
+
+def pendulum() -> Robot:
+    """A turning column and a horizontal joint with a weight, whose reading goes the other way round."""
+    weight = {"mass": 8.0, "center_of_mass": [0.0, 0.0, 0.4], "inertia": np.eye(3) * 0.05}
+    column = {"mass": 5.0, "center_of_mass": [0.0, 0.0, 0.1], "inertia": np.eye(3) * 0.05}
+    T = np.eye(4)
+    T[:3, 3] = [0.1, 0.2, 0.5]
+    return Robot(
+        "pendulum",
+        joints=[
+            Joint("J1", axis=[0.0, 0.0, 1.0], **column),
+            Joint("J2", T_parent_joint=T, axis=[0.0, 1.0, 0.0], ratio=-1.02, offset=0.3, **weight),
+        ],
+        convention="urdf",
+        gravity=[0.0, 0.0, -9.81],
+    )
+
+
+def test_friction_by_the_load_of_an_upright_joint_is_that_of_a_tendon(tmp_path: Path) -> None:
+    robot = pendulum().replace(torque_effects=[applied("coulomb", J2=2.0), applied("load_friction", J2=0.2)])
+    rng = np.random.default_rng(7)
+    time = np.arange(0.0, 60.0, 0.02)  # so slow that the load is the weight
+    waves = [rng.uniform(0.4, 1.2) * np.sin(w * time + rng.uniform(0, 6)) for w in (0.1, 0.2, 0.4, 0.7)]
+    q = np.column_stack([0.3 * waves[0], sum(waves)])
+    motion = Recording("motion", time=time, position=q, torque=np.zeros_like(q))
+    motion = motion.replace(torque=predict(robot, motion).torque)
+    exported = export(robot, "mjcf", tmp_path, recordings=[motion])
+    (left,) = exported.not_written
+    assert left.name == "load_friction.J2" and "tendon" in left.reason
+    assert exported.refitted == () and exported.callbacks_model is not None
+    model = mujoco.MjModel.from_xml_path(str(exported.model))
+    data = mujoco.MjData(model)
+
+    def needed(angle: float, speed: float) -> float:
+        set_readings(exported.chain, model, data, np.array([0.0, angle]))
+        data.qvel[:] = [0.0, -1.02 * speed]
+        data.qacc[:] = 0.0
+        mujoco.mj_inverse(model, data)
+        return float(-1.02 * data.qfrc_inverse[1])
+
+    for angle in np.linspace(-2.0, 2.0, 9):
+        held = 0.5 * (needed(angle, 1.0) - needed(angle, -1.0))
+        weighs = abs(0.5 * (needed(angle, 1.0) + needed(angle, -1.0)))
+        assert held == pytest.approx(2.0 + 0.2 * weighs, abs=0.35)
+    flat = export(robot, "mjcf", tmp_path / "flat")  # no motion says what the joint's angles are
+    assert "<spatial" not in flat.model.read_text(encoding="utf-8")

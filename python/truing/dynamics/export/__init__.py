@@ -153,23 +153,30 @@ class _Written:
     files: dict[str, str]  # text by name
     callbacks: str  # text of callbacks.py; "" if it needs none
     left: list[NotWritten]
+    nearly: frozenset[str] = frozenset()  # effects of `left` that the file has nearly
+
+    def lacking(self) -> list[str]:
+        """Parameters without which the robot is to be fitted anew."""
+        return refit.lacking(self.robot, (item for item in self.left if item.name not in self.nearly))
 
 
 def _written(
     robot: _core.Robot, to: Simulator, source: str | None, recordings: Sequence[Recorded], alone: bool = False
 ) -> _Written:
-    """alone: the MJCF says that callbacks.py does not belong to it."""
+    """alone: the MJCF is used without callbacks.py, which it says does not belong to it."""
     chain = chain_of(robot)
     usual = reference_motion(robot, chain)
     reference = recorded_motion(robot, recordings) if recordings else usual
     parts = parts_of(robot, chain, reference)
     name = file_name(robot.name)
     if to == "mjcf":
-        model = mjcf.model_of(chain, parts, reference)
+        model = mjcf.model_of(chain, parts, reference, levers=alone)
         text = mjcf.write(robot, chain, parts, model, CALLBACKS_MODEL if alone else "")
         _check(robot, chain, usual, text)
         callbacks = _callbacks_text(chain, model) if model.beside else ""
-        return _Written(robot, chain, f"{name}.xml", {f"{name}.xml": text}, callbacks, model.not_written)
+        nearly = frozenset(tendon.effect for tendon in model.levers)
+        files = {f"{name}.xml": text}
+        return _Written(robot, chain, f"{name}.xml", files, callbacks, model.not_written, nearly)
     text, left = urdf.write(robot, chain, parts, reference, source)
     files = {f"{name}.urdf": text}
     if to == "urdf":
@@ -183,9 +190,11 @@ def _refitted(
 ) -> tuple[_Written, list[str], str]:
     """What is written where no callback adds anything: the robot itself, or the one that was fitted without
     what the format does not hold. Then the parameters that this is; or why it was not done."""
-    parameters = refit.lacking(whole.robot, whole.left)
+    bare = bool(whole.callbacks) and bool(recordings)
+    near = _written(whole.robot, to, source, recordings, alone=True) if bare else whole
+    parameters = near.lacking()
     if not parameters:
-        return whole, [], ""
+        return near if near.nearly else whole, [], ""
     wanted = f"not fitted anew without {', '.join(parameters)}"
     if not recordings:
         return whole, [], f"{wanted}: that needs the recordings that the robot was fitted to"
@@ -221,7 +230,7 @@ def _anew(
     while True:
         robot = refit.fit_without(whole.robot, parameters, to, recordings, cutoff, bare)
         anew = _written(robot, to, source, recordings, alone=bool(whole.callbacks))
-        more = refit.joints_with(robot, refit.lacking(robot, anew.left)) - bare
+        more = refit.joints_with(robot, anew.lacking()) - bare
         if not more:
             return anew
         bare |= more

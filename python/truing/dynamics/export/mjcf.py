@@ -12,6 +12,7 @@ Effects and elements of MuJoCo 4:
   g(v) = F_C + (F_S - F_C) exp(-(v / v_S)^2). With s0 = F_C / x0 a reversal costs the same work as with the
   stop operator of `presliding`: the area between either law and full friction is 2 x0 F_C.
 - ripple, constant torques: `dcmotor` cogging, amplitude * sin(poles * q + phase).
+- friction that grows with the load or goes with the angle: a spatial tendon (`lever`), where that is near it.
 """
 
 from __future__ import annotations
@@ -25,11 +26,13 @@ import numpy as np
 from truing import _core
 from truing.dynamics.export.beside import NO_CALLBACKS, Effect
 from truing.dynamics.export.chain import Body, Chain, Floats, Link, body_in, plain
+from truing.dynamics.export.lever import Lever, ends, lever_for
 from truing.dynamics.export.parts import (
     JointParts,
     NotWritten,
     Parts,
     Reference,
+    friction_of,
     name_of,
     negative,
     rms,
@@ -41,6 +44,7 @@ STEP = 0.001  # [s] of the model
 FRICTION_HOLDS = (0.9999, 0.9999, 0.001)  # solimpfriction: with MuJoCo's 0.9 light joints creep
 FRICTION_TIME = 0.004  # [s] solreffriction: with MuJoCo's 0.02 dry friction is viscous below 0.03 rad/s
 _EQUALITY = 0.004  # [s] the same of joints that follow others
+_HIDDEN = "5"  # group that viewers do not show: the far end of a tendon is metres away
 _STRIBECK_X0 = 1e-3  # [rad | m] over which a Stribeck friction without presliding builds up
 
 Element = ElementTree.Element
@@ -75,6 +79,15 @@ class Tendon:
 
 
 @dataclass
+class LeverTendon:
+    """A spatial tendon whose friction stands for an effect."""
+
+    effect: str  # "load_friction.J2"
+    joint: str
+    lever: Lever
+
+
+@dataclass
 class Model:
     """What an MJCF says, and what is left."""
 
@@ -82,11 +95,13 @@ class Model:
     tendons: list[Tendon]
     beside: list[Effect]
     not_written: list[NotWritten]
+    levers: list[LeverTendon] = field(default_factory=list)
     fields_beside: dict[str, list[float]] = field(default_factory=dict)
     """What the callbacks add to: friction and damping without stand-ins for what they compute."""
 
 
-def model_of(chain: Chain, parts: Parts, reference: Reference) -> Model:
+def model_of(chain: Chain, parts: Parts, reference: Reference, levers: bool) -> Model:
+    """levers: tendons may stand for friction; then callbacks.py does not belong to the model."""
     names = [link.name for link in chain.driven]
     model = Model([], [], [], list(parts.not_written))
     for j, own in enumerate(parts.joints):
@@ -98,8 +113,16 @@ def model_of(chain: Chain, parts: Parts, reference: Reference) -> Model:
         "damping": [float(fields.damping[0]) for fields in model.joints],
     }
     for effect in model.beside:
+        fields, link = model.joints[effect[1]], chain.driven[effect[1]]
+        if levers and (lever := _lever(effect, link, reference)) is not None:
+            name = name_of(effect, names)
+            model.levers.append(LeverTendon(name, link.name, lever))
+            fields.frictionloss += lever.constant * abs(link.ratio)
+            fields.damping[0] += lever.slope * link.ratio**2
+            reason = "the friction of a tendon, which goes with the joint's angle, stands for it"
+            model.not_written.append(NotWritten(name, lever.left * abs(link.ratio), reason))
+            continue
         instead = stand_in(effect, reference)
-        fields = model.joints[effect[1]]
         fields.frictionloss += instead.coulomb
         fields.damping[0] += instead.viscous
         with_which = "; Coulomb friction and damping stand for it without them" if instead.coulomb else ""
@@ -111,6 +134,15 @@ def model_of(chain: Chain, parts: Parts, reference: Reference) -> Model:
             model.not_written.append(NotWritten(f"coulomb.{names[j]}", -fields.frictionloss, reason))
             fields.frictionloss = 0.0
     return model
+
+
+def _lever(effect: Effect, link: Link, reference: Reference) -> Lever | None:
+    """What a tendon can do for friction of a joint that turns."""
+    if link.prismatic or effect[0] not in ("load_friction", "position_friction"):
+        return None
+    j, r = effect[1], link.ratio
+    friction = friction_of(effect, reference) / abs(r)
+    return lever_for(friction, r * reference.q[:, j], r * reference.qd[:, j])
 
 
 def _fields(j: int, name: str, own: JointParts, model: Model, reference: Reference) -> JointFields:
@@ -208,9 +240,15 @@ def write(robot: _core.Robot, chain: Chain, parts: Parts, model: Model, callback
     springs = dict(zip((link.name for link in chain.driven), (p.spring for p in parts.joints), strict=True))
     parent, before = world, np.eye(4)
     for link in chain.links:
-        parent = _child(parent, "body", _pose(before @ link.before), name=f"{link.name}_link")
+        behind = parent
+        parent = _child(behind, "body", _pose(before @ link.before), name=f"{link.name}_link")
         _inertial(parent, body_in(link.after, link.body))
         _joint(parent, link, fields.get(link.name), springs.get(link.name, 0.0))
+        for tendon in (one for one in model.levers if one.joint == link.name):
+            far, near = ends(link.axis, tendon.lever.zero)
+            at = before @ link.before @ np.append(far, 1.0)
+            _child(behind, "site", name=f"{tendon.effect}.far", pos=plain(at[:3]), group=_HIDDEN)
+            _child(parent, "site", name=f"{tendon.effect}.lever", pos=plain(near), group=_HIDDEN)
         before = link.after
     for target in robot.targets:
         _child(parent, "site", _pose(before @ np.array(target.T_last_target)), name=target.name)
@@ -256,12 +294,19 @@ def _joint(parent: Element, link: Link, fields: JointFields | None, spring: floa
 
 
 def _followers(root: Element, chain: Chain, model: Model) -> None:
-    """Joints that follow others, and tendons of couplings."""
+    """Joints that follow others, tendons of couplings and of friction."""
     names = [link.name for link in chain.driven]
     ratio = {link.name: link.ratio for link in chain.driven}
     followers = [link for link in chain.links if link.drivers]
-    if followers or model.tendons:
+    if followers or model.tendons or model.levers:
         tendons = _child(root, "tendon")
+    for held in model.levers:
+        spatial = _child(tendons, "spatial", name=held.effect, group=_HIDDEN)
+        spatial.set("frictionloss", plain(held.lever.force))
+        spatial.set("solreffriction", plain([FRICTION_TIME, 1.0]))
+        spatial.set("solimpfriction", plain(FRICTION_HOLDS))
+        for end in ("far", "lever"):
+            _child(spatial, "site", site=f"{held.effect}.{end}")
     for tendon in model.tendons:
         fixed = _child(tendons, "fixed", name=tendon.name)
         if tendon.damping:

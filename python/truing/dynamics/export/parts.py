@@ -388,12 +388,7 @@ def stand_in(effect: Effect, reference: Reference) -> StandIn:
     j = effect[1]
     if effect[0] not in ("load_friction", "viscous_law", "stribeck", "position_friction"):
         return StandIn(0.0, 0.0, reference.size(effect))
-    zero = [0.0] * reference.q.shape[1]
-    positive, negative = (
-        dry_friction(reference.q, reference.qd, reference.torque, REFERENCE_C, 0.0, [one], zero)[:, j]
-        for one in (effect, (*effect[:3], _turned(effect[3])))
-    )
-    wanted, speed = positive - negative, np.abs(reference.qd[:, j])
+    wanted, speed = friction_of(effect, reference), np.abs(reference.qd[:, j])
     columns = np.column_stack([np.ones_like(speed), speed])
     constant, slope = np.linalg.lstsq(columns, wanted, rcond=None)[0].tolist()
     mean = float(wanted.mean())
@@ -402,6 +397,17 @@ def stand_in(effect: Effect, reference: Reference) -> StandIn:
     elif slope * mean < 0.0:
         constant, slope = mean, 0.0
     return StandIn(constant, slope, rms(wanted - constant - slope * speed))
+
+
+def friction_of(effect: Effect, reference: Reference) -> Floats:
+    """Dry friction of an effect of `beside` without its sign; below zero where it takes from that of others.
+    shape=(n,) [Nm | N]"""
+    zero = [0.0] * reference.q.shape[1]
+    positive, negative = (
+        dry_friction(reference.q, reference.qd, reference.torque, REFERENCE_C, 0.0, [one], zero)[:, effect[1]]
+        for one in (effect, (*effect[:3], _turned(effect[3])))
+    )
+    return np.asarray(positive - negative)
 
 
 def stand_ins(
