@@ -325,14 +325,22 @@ class Builder {
   }
 
   /// Where no temperature was recorded, what follows it is a function of time: all lengths that grow together, which
-  /// nothing else does, by name; a joint's zero, which other things move as well, as a function that is unknown.
+  /// nothing else does, by name; a joint's zero, which other things move as well, as a function that is unknown. Where
+  /// one was, nothing is as warm as its sensor says, and the first joint's zero may stand where a drift is named.
   void warmth_over_time() {
     const int time = time_index();
-    if (task_.data.temperature || time < 0) return;
+    if (time < 0) return;
     for (const Effect& effect : catalogue()) {
       if (effect.traits.driver != Driver::temperature || !is_searched(effect) || left_out(effect.name)) continue;
+      const bool of_zeros = effect.traits.law_test == LawTest::of_driver;
+      if (task_.data.temperature) {
+        if (of_zeros) add_moving_zero(effect.name, task_.at.joints.front(), time, true);
+        continue;
+      }
       if (effect.traits.law_test == LawTest::times_the_lengths) add_growths(effect.name, time);
-      if (effect.traits.law_test == LawTest::of_driver) add_moving_zeros(effect.name, time);
+      if (of_zeros) {
+        for (const Joint& joint : task_.at.joints) add_moving_zero(effect.name, joint, time, false);
+      }
     }
   }
 
@@ -344,7 +352,7 @@ class Builder {
   }
 
   /// A candidate that is one function of time, with a few knots and with more of them.
-  void add_over_time(const Explanation& what, const std::string& prefix) {
+  void add_over_time(const Explanation& what, const std::string& prefix, bool only_alternative = false) {
     for (const int most : {kDriftKnots[0], kDriftKnots[1]}) {
       Explanation e = what;
       e.knots = {knots_of(task_.inputs[static_cast<std::size_t>(e.inputs[0])], task_.rows, most)};
@@ -353,7 +361,9 @@ class Builder {
       if (count < 4 || no_finer || static_cast<int>(count) > most_parameters()) return;
       for (std::size_t k = 0; k < count; ++k)
         e.parameters.push_back(prefix + "_" + std::to_string(count) + "." + std::to_string(k + 1));
-      add(std::move(e), {});
+      ColumnGroup group;
+      group.shadow = only_alternative;
+      add(std::move(e), std::move(group));
     }
   }
 
@@ -370,14 +380,12 @@ class Builder {
     add_over_time(e, effect + (joints.empty() ? "" : "." + joints[0]) + ".of_" + e.driver);
   }
 
-  void add_moving_zeros(const std::string& effect, int time) {
-    for (const Joint& joint : task_.at.joints) {
-      if (joint.passive()) continue;
-      Explanation e = wandering(effect, joint.name, time, {});
-      e.kind = Explanation::Kind::free;
-      e.joints = {joint.name};
-      add_over_time(e, "free." + joint.name + "." + e.driver);
-    }
+  void add_moving_zero(const std::string& effect, const Joint& joint, int time, bool only_alternative) {
+    if (joint.passive()) return;
+    Explanation e = wandering(effect, joint.name, time, {});
+    e.kind = Explanation::Kind::free;
+    e.joints = {joint.name};
+    add_over_time(e, "free." + joint.name + "." + e.driver, only_alternative);
   }
 
   /// Corrections of the laws of effects at joints, to be asked for once the effect itself is in.

@@ -307,6 +307,9 @@ bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State
 /// knots, whichever is likelier [nats].
 double best_function(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
                      int angle);
+/// The same of anything that has a value for every row, by knots.
+double best_function_of(const InputColumn& along, const Work& work, const Evidence& evidence,
+                        const Evidence::State& state, std::size_t joint);
 
 // --- sureness.cpp: how sure that is ----------------------------------------------------------------------------------
 

@@ -50,8 +50,9 @@ std::vector<Shape> shapes_of(const std::vector<double>& places) {
 /// A joint that moves as a function of an input beside a state, on the rows that are looked at.
 class Beside {
  public:
-  Beside(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int input)
-      : along_(work.inputs[static_cast<std::size_t>(input)]),
+  Beside(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
+         const InputColumn& along)
+      : along_(along),
         evidence_(evidence),
         left_(what_is_left(work.design, state, kValuesSeen)),
         times_(1.0 / (left_.share * work.noise.design_effect)),
@@ -129,11 +130,11 @@ double best_shape(const Beside& beside) {
 
 double best_local_shape(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
                         int input) {
-  return best_shape(Beside(work, evidence, state, joint, input));
+  return best_shape(Beside(work, evidence, state, joint, work.inputs[static_cast<std::size_t>(input)]));
 }
 
 bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint, int angle) {
-  const Beside beside(work, evidence, state, joint, angle);
+  const Beside beside(work, evidence, state, joint, work.inputs[static_cast<std::size_t>(angle)]);
   const double by_waves = beside.evidence_of_waves();
   return by_waves > beside.evidence_of_knots(kKnots) && by_waves > beside.evidence_of_knots(kFineKnots) &&
          by_waves > best_shape(beside);
@@ -141,8 +142,14 @@ bool is_smooth(const Work& work, const Evidence& evidence, const Evidence::State
 
 double best_function(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t joint,
                      int angle) {
-  const Beside beside(work, evidence, state, joint, angle);
+  const Beside beside(work, evidence, state, joint, work.inputs[static_cast<std::size_t>(angle)]);
   return std::max({beside.evidence_of_waves(), beside.evidence_of_knots(kKnots), beside.evidence_of_knots(kFineKnots)});
+}
+
+double best_function_of(const InputColumn& along, const Work& work, const Evidence& evidence,
+                        const Evidence::State& state, std::size_t joint) {
+  const Beside beside(work, evidence, state, joint, along);
+  return std::max(beside.evidence_of_knots(kKnots), beside.evidence_of_knots(kFineKnots));
 }
 
 }  // namespace truing::diagnosis

@@ -276,8 +276,11 @@ static bool stand_by_themselves(const Work& work, const Evidence& evidence, cons
   const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, names));
   std::vector<int> time;
   for (const int g : names) {
-    const std::vector<int>& inputs = work.design.candidates.named[static_cast<std::size_t>(g)].inputs;
-    time.insert(time.end(), inputs.begin(), inputs.end());
+    const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(g)];
+    time.insert(time.end(), name.inputs.begin(), name.inputs.end());
+    const int recorded = input_named(work, "time");
+    const bool is_rate = name.inputs.empty() && effect_traits(work, name).driver == Driver::time;
+    if (is_rate && recorded >= 0) time.push_back(recorded);
   }
   const double by_names = evidence.gain(rest, columns_of_groups(work, names), 0.0).evidence;
   return by_names > as_lagging_warmth(work, evidence, rest, law, time) + decision.search.threshold;
@@ -330,6 +333,41 @@ static bool is_left_by_coupling(const Work& work, const Evidence& evidence, cons
   });
 }
 
+/// [rad | m] by which a law moves its joint, for every row.
+static InputColumn motion_by(const Work& work, const Evidence::State& state, int law, std::size_t joint) {
+  const ColumnGroup& group = work.design.candidates.groups[static_cast<std::size_t>(law)];
+  const Eigen::VectorXd theta = solution_of(state, group);
+  const int unit = work.design.joint_column[joint][0];
+  InputColumn out{"", "rad", static_cast<int>(joint), false,
+                  std::vector<double>(work.inputs.front().values.size(), 0.0)};
+  std::vector<double> squares(out.values.size(), 0.0);
+  for (Eigen::Index i = 0; i < work.design.x.rows(); ++i) {
+    const auto row = static_cast<std::size_t>(work.design.row[static_cast<std::size_t>(i)]);
+    const double per_unit = work.design.x(i, unit);
+    for (Eigen::Index k = 0; k < theta.size(); ++k)
+      out.values[row] += per_unit * theta[k] * work.design.x(i, group.columns[static_cast<std::size_t>(k)]);
+    squares[row] += per_unit * per_unit;
+  }
+  for (std::size_t row = 0; row < squares.size(); ++row) out.values[row] /= std::max(squares[row], 1e-300);
+  return out;
+}
+
+/// A joint that gives way to its load by a law that is not the simple one: what that leaves goes with the load, and
+/// looks like a law of the joint's angle. Held against any function of what the law makes of the load.
+static bool is_left_by_load(const Work& work, const Evidence& evidence, const Decision& decision, int group, int law) {
+  const Explanation& small = work.design.candidates.named[static_cast<std::size_t>(group)];
+  const Explanation& large = work.design.candidates.named[static_cast<std::size_t>(law)];
+  const EffectTraits &one = effect_traits(work, small), &other = effect_traits(work, large);
+  const bool by_angle = one.moves == Moves::joint && follows_own_angle(one);
+  const bool by_load = other.moves == Moves::joint && other.driver == Driver::gravity_torque;
+  if (!by_angle || !by_load || large.joints.size() != 1 || small.joints != large.joints) return false;
+  const std::size_t joint = work.given.frames.robot.joint_index(large.joints[0]);
+  const Evidence::State rest = evidence.evaluate(without_these(decision.state.choice, {group}));
+  const double by_name = evidence.gain(rest, columns_of_groups(work, {group}), 0.0).evidence;
+  return by_name <
+         best_function_of(motion_by(work, rest, law, joint), work, evidence, rest, joint) + decision.search.threshold;
+}
+
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision) {
   const auto named = [&](int g) -> const Explanation& {
     return work.design.candidates.named[static_cast<std::size_t>(g)];
@@ -347,7 +385,8 @@ std::map<int, int> departures_from_laws(const Work& work, const Evidence& eviden
       const auto [less_size, less] = laws[small];
       if (out.count(group) || out.count(less) || !(less_size < size)) continue;
       if (is_departure(work, named(less), named(group), less_size / size) ||
-          is_left_by_coupling(work, evidence, decision, less, named(less), named(group)))
+          is_left_by_coupling(work, evidence, decision, less, named(less), named(group)) ||
+          is_left_by_load(work, evidence, decision, less, group))
         out[less] = group;
       if (may_be_warmth(work, named(less), named(group))) warmth.push_back(less);
     }

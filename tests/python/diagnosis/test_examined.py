@@ -123,3 +123,24 @@ def test_a_law_that_is_most_of_an_unknown_function_is_doubted(which: str) -> Non
     (named,) = truing.diagnose(robot, data).effects
     assert label["unlisted"] in {"sawtooth", "neighbour_switch"}
     assert named.grounds["law_is_part"] == 1.0 and named.probability < 0.7
+
+
+@pytest.mark.parametrize(("which", "joint"), [("0@9972", "J2"), ("5@9972", "A2")])
+def test_what_a_joint_that_hardens_leaves_is_no_harmonic(which: str, joint: str) -> None:
+    """It was one of .94 and of .93 beside the joint's compliance."""
+    robot, data, _ = make(f"examination/wrong_law/{which}")
+    found = truing.diagnose(robot, data)
+    assert [(e.effect, e.joints) for e in found.effects] == [("joint_compliance", (joint,))]
+
+
+def test_what_a_zero_that_warms_late_leaves_is_no_drift() -> None:
+    """A rate of the base of .94 beside it."""
+    robot, data, _ = make("examination/wrong_law/1@42")
+    assert [(e.effect, e.joints) for e in truing.diagnose(robot, data).effects] == [("thermal_zero", ("J1",))]
+
+
+def test_a_drift_that_the_first_joint_may_be_is_said_with_its_zero() -> None:
+    """Its temperature was recorded, and its zero follows that late: a drift, .99 sure."""
+    robot, data, _ = make("examination/wrong_law/33@9971")
+    (drift,) = [e for e in truing.diagnose(robot, data).effects if e.effect == "drift"]
+    assert ("thermal_zero", ("J1",)) in [(one.effect, one.joints) for one in drift.confounded_with]
