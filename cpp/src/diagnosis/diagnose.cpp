@@ -404,10 +404,13 @@ void describe_all(const Work& work, const Evidence& evidence, const Decision& de
     unknown.share = shares[at];
     out->unknown.push_back(std::move(unknown));
   }
-  const bool unknown = !out->unknown.empty() || !decision.too_large.empty();
   for (std::size_t at = 0; at < chosen.size(); ++at) {
     const auto named = names.find(chosen[at]);
     if (named == names.end()) continue;
+    const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(chosen[at])];
+    const bool unknown =
+        !decision.too_large.empty() || std::any_of(out->unknown.begin(), out->unknown.end(),
+                                                   [&](const UnknownEffect& u) { return !is_left_by(work, name, u); });
     out->effects.push_back(describe(work, evidence, decision, at, named->second, resampled, unknown, refitted));
     out->effects.back().share = shares[at] + by_corrections[chosen[at]];
   }

@@ -319,8 +319,11 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
 /// Names that are what a larger law at their joint leaves of the motion, by group, and the group of that law.
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision);
 Resampled resample(const Work& work, const Decision& decision);
+/// Is what was found without a name what the name's law leaves at its joint, were it not exact? Warmth lags behind its
+/// sensor: a function of time; what changes with the direction grows with the load, or goes with the angle.
+bool is_left_by(const Work& work, const Explanation& name, const UnknownEffect& unknown);
 /// What speaks for a chosen group's name, and against it. Errors of poses that the fit did not see, without it and with
-/// it; `unknown`: something was found that has no name.
+/// it; `unknown`: something was found that has no name, and is not left by this one.
 std::vector<Ground> grounds_of(const Work& work, const Decision& decision, const Resampled& resampled, int group,
                                const Sureness& sure, const UnseenErrors& without, const UnseenErrors& with,
                                bool unknown);

@@ -493,6 +493,22 @@ static double selection_frequency(const Work& work, const Resampled& resampled, 
   return back / draws;
 }
 
+bool is_left_by(const Work& work, const Explanation& name, const UnknownEffect& unknown) {
+  const EffectTraits& traits = effect_traits(work, name);
+  const bool there = name.joints.empty() || name.joints == std::vector<std::string>{unknown.joint};
+  const std::vector<Joint>& joints = work.given.frames.robot.joints;
+  const auto at = std::find_if(joints.begin(), joints.end(), [&](const Joint& j) { return j.name == unknown.joint; });
+  if (name.kind != Kind::catalogue || !there || at == joints.end() || unknown.inputs.empty()) return false;
+  const auto joint = static_cast<std::size_t>(at - joints.begin());
+  std::vector<std::string> own;
+  if (traits.driver == Driver::temperature) own = {"time", "order"};
+  if (traits.law_test == LawTest::times_direction)
+    own = {input_name(Driver::direction, joint), input_name(Driver::gravity_torque, joint),
+           input_name(Driver::angle, joint)};
+  return std::all_of(unknown.inputs.begin(), unknown.inputs.end(),
+                     [&](const std::string& input) { return std::find(own.begin(), own.end(), input) != own.end(); });
+}
+
 // Weights: docs/method/exam.md, "Confidence".
 std::vector<Ground> grounds_of(const Work& work, const Decision& decision, const Resampled& resampled, int group,
                                const Sureness& sure, const UnseenErrors& without, const UnseenErrors& with,

@@ -144,3 +144,18 @@ def test_a_drift_that_the_first_joint_may_be_is_said_with_its_zero() -> None:
     robot, data, _ = make("examination/wrong_law/33@9971")
     (drift,) = [e for e in truing.diagnose(robot, data).effects if e.effect == "drift"]
     assert ("thermal_zero", ("J1",)) in [(one.effect, one.joints) for one in drift.confounded_with]
+
+
+@pytest.mark.parametrize(
+    ("which", "effect"), [("31@42", "thermal"), ("41@42", "thermal_zero"), ("2@42", "backlash")]
+)
+def test_what_a_law_leaves_at_its_joint_speaks_not_against_its_name(which: str, effect: str) -> None:
+    """A function of time where a link warms late, one of the load where play grows with it: the names were
+    right, and stated with .71 to .82.
+    """
+    robot, data, label = make(f"examination/wrong_law/{which}")
+    found = truing.diagnose(robot, data)
+    (named,) = found.effects
+    assert (named.effect, list(named.joints)) == (effect, label["effects"][0]["joints"])
+    assert [u.joint for u in found.unknown] == list(named.joints)
+    assert named.grounds["unknown_found"] == 0.0 and named.probability > 0.9
