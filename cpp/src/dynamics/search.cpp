@@ -86,6 +86,7 @@ FoldFit::FoldFit(const Sums& sums, std::size_t fold, const std::vector<int>& nui
 FoldFit::Column& FoldFit::column(int number) {
   Column& out = columns_[static_cast<std::size_t>(number)];
   if (out.half.size() == 0) {
+    out.number = number;
     out.held = fold_.products(nuisance_, number);
     VectorXd others(out.held.size());
     for (Index k = 0; k < others.size(); ++k) others[k] = sums_.all.xx(nuisance_[static_cast<std::size_t>(k)], number);
@@ -100,13 +101,12 @@ FoldFit::Column& FoldFit::column(int number) {
   return out;
 }
 
-const FoldFit::Pair& FoldFit::pair(int one, int other) {
-  const auto [low, high] = std::minmax(one, other);
-  Column &a = column(low), &b = column(high);
+const FoldFit::Pair& FoldFit::pair(Column& one, Column& other) {
+  Column &a = one.number < other.number ? one : other, &b = &a == &one ? other : one;
   Pair& out = a.pairs.size() < b.pairs.size() ? b.pairs[a.pairs.size() - 1] : a.pairs[b.pairs.size() - 1];
   if (std::isnan(out.held)) {
-    const double held = fold_.product(low, high);
-    out.others = sums_.all.xx(low, high) - held - a.half.dot(b.half);
+    const double held = fold_.product(a.number, b.number);
+    out.others = sums_.all.xx(a.number, b.number) - held - a.half.dot(b.half);
     out.held = held - a.follow.dot(b.left) - a.held.dot(b.follow);
   }
   return out;
@@ -118,13 +118,13 @@ double FoldFit::squares(const Evidence::State& state) {
   const auto m = static_cast<Index>(state.columns.size() - always);
   MatrixXd rest(m, m), squares(m, m);
   VectorXd right(m), product(m);
+  std::vector<Column*> own;
   for (Index i = 0; i < m; ++i) {
-    const int number = state.columns[always + static_cast<std::size_t>(i)];
-    const Column& one = column(number);
-    right[i] = one.right;
-    product[i] = one.product;
+    own.push_back(&column(state.columns[always + static_cast<std::size_t>(i)]));
+    right[i] = own.back()->right;
+    product[i] = own.back()->product;
     for (Index k = 0; k <= i; ++k) {
-      const Pair& both = pair(number, state.columns[always + static_cast<std::size_t>(k)]);
+      const Pair& both = pair(*own.back(), *own[static_cast<std::size_t>(k)]);
       rest(i, k) = both.others;
       squares(i, k) = both.held;
     }

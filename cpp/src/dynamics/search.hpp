@@ -43,6 +43,7 @@ class FoldFit {
   };
   /// One of these columns, x; of them only what was asked for is known.
   struct Column {
+    int number = 0;
     Eigen::VectorXd held;     ///< N^T x on the fold
     Eigen::VectorXd half;     ///< L^-1 N^T x on the others
     Eigen::VectorXd follow;   ///< what the nuisance columns' values give way by, for a value of one
@@ -52,7 +53,7 @@ class FoldFit {
     std::vector<Pair> pairs;  ///< with every column that was asked for no later than this one, in that order
   };
   Column& column(int number);
-  const Pair& pair(int one, int other);
+  const Pair& pair(Column& one, Column& other);
 
   const Sums& sums_;
   const FoldGram& fold_;
