@@ -78,13 +78,14 @@ class Naming {
     double in_class = 1.0, outside = std::exp(-kTempered * loss);
     std::vector<Evidence::Gain> gains = search_.gains(rest);
     std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+    const auto explained_by = search_.evidence().explained(less, mine.columns, theta);
     for (const Evidence::Gain& gain : gains) {
       const TorqueGroup& other = group_of(design_, gain.group);
       if (other.effect.empty() || gain.rank == 0 || is_in(gain.group) || same_name(other, mine)) continue;
       if (!seen.insert({other.effect, other.joints}).second) continue;
       const double behind = loss - gain.score;
       const double weight = std::exp(-kTempered * std::max(behind, 0.0));
-      const double r2 = search_.evidence().explained(less, mine.columns, theta, other.columns);
+      const double r2 = explained_by(other.columns);
       if (r2 < kSameR2) continue;  // it explains something else
       if (behind < kClassNats || r2 > kClassR2) {
         confounded->push_back({other.effect, other.joints, weight});

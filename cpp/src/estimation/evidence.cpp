@@ -340,15 +340,22 @@ double Evidence::visible(const State& state, int column) const {
 
 double Evidence::explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
                            const std::vector<int>& by) const {
-  const Eigen::MatrixXd v = projected_on(state, what), w = projected_on(state, by);
-  const Eigen::MatrixXd aa = rest(what, what) - v.transpose() * v;
-  const Eigen::MatrixXd ab = rest(what, by) - v.transpose() * w;
-  Eigen::MatrixXd bb = rest(by, by) - w.transpose() * w;
-  for (Eigen::Index k = 0; k < bb.rows(); ++k)
-    bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
-  const double all = theta.dot(aa * theta);
-  const Eigen::VectorXd right = ab.transpose() * theta;
-  return all > 0.0 ? std::min(1.0, right.dot(solve_symmetric<Eigen::Dynamic, 1>(bb, right)) / all) : 0.0;
+  return explained(state, what, theta)(by);
+}
+
+std::function<double(const std::vector<int>&)> Evidence::explained(const State& state, const std::vector<int>& what,
+                                                                   const Eigen::VectorXd& theta) const {
+  const Eigen::VectorXd v = projected_on(state, what) * theta;
+  const double all = theta.dot(rest(what, what) * theta) - v.squaredNorm();
+  return [this, &state, what, theta, v, all](const std::vector<int>& by) {
+    if (!(all > 0.0)) return 0.0;
+    const Eigen::MatrixXd w = projected_on(state, by);
+    Eigen::MatrixXd bb = rest(by, by) - w.transpose() * w;
+    for (Eigen::Index k = 0; k < bb.rows(); ++k)
+      bb(k, k) += 1e-9 * gram_.xx(by[static_cast<std::size_t>(k)], by[static_cast<std::size_t>(k)]) + 1e-300;
+    const Eigen::VectorXd right = rest(what, by).transpose() * theta - w.transpose() * v;
+    return std::min(1.0, right.dot(solve_symmetric<Eigen::Dynamic, 1>(bb, right)) / all);
+  };
 }
 
 std::vector<Evidence::Gain> Evidence::gains(const State& state) const {

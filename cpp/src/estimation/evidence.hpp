@@ -7,6 +7,7 @@
 // list.)
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -133,6 +134,9 @@ class Evidence {
   /// Share of what columns `what` times `theta` do, beyond the state's own columns, that columns `by` can do as well.
   double explained(const State& state, const std::vector<int>& what, const Eigen::VectorXd& theta,
                    const std::vector<int>& by) const;
+  /// The same of one `by` after the other: what is of `what` alone is found once. It lives no longer than the state.
+  std::function<double(const std::vector<int>& by)> explained(const State& state, const std::vector<int>& what,
+                                                              const Eigen::VectorXd& theta) const;
 
   /// Forward with a beam, then backward and swap until nothing helps.
   State search(const SearchOptions& options, const Choice& start = {}) const;
