@@ -38,14 +38,14 @@ std::vector<int> all_columns(const TorqueDesign& design) {
 
 /// Columns of the rigid chain at every row of a motion, filtered: by joint, those of the links that it feels.
 std::vector<MatrixXd> filtered_links(const RigidChain& chain, const Tile& tile) {
-  thread_local std::vector<double> room;
+  thread_local VectorXd room;  // of a std::vector what was in it would be moved, and the rest cleared
   const Motion& motion = tile.motion;
   const Index rows = RigidChain::padded(motion.rows());
   std::vector<double*> blocks(static_cast<std::size_t>(chain.driven() * chain.links()), nullptr);
   std::vector<MatrixXd> out;
   std::size_t felt = 0;
   for (Index k = 0; k < chain.driven(); ++k) felt += chain.felt_links(k).size();
-  room.resize(felt * static_cast<std::size_t>(kLinkParameters * rows));
+  room.resize(std::max(room.size(), static_cast<Index>(felt) * kLinkParameters * rows));
   double* next = room.data();
   for (Index k = 0; k < chain.driven(); ++k) {
     for (const Index link : chain.felt_links(k)) {
