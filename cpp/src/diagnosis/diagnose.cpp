@@ -99,8 +99,8 @@ Registered part_of(const Registered& whole, const std::vector<std::int32_t>& row
   return part;
 }
 
-/// Sections 1 and 2: linearised once, where the geometry is about right; weighed; Gram matrices by fold.
-Work prepare(Registered given) {
+/// Sections 1 and 2: linearised once, `there` or where the geometry is about right; weighed; Gram matrices by fold.
+Work prepare(Registered given, const std::optional<Linearisation>& there = {}) {
   Work work;
   work.given = std::move(given);
   const DiagnoseOptions& options = work.given.options;
@@ -111,7 +111,7 @@ Work prepare(Registered given) {
   for (const std::int32_t row : every_row) {
     if (!work.given.set[static_cast<std::size_t>(row)]) train_rows.push_back(row);
   }
-  work.linear = linearise(robot, data, train_rows, options.rotation_length, options.threads);
+  work.linear = there ? *there : linearise(robot, data, train_rows, options.rotation_length, options.threads);
   work.inputs = make_inputs(work.linear.at, data);
   work.design = make_design({robot, work.linear.at, work.linear.shift, data, work.inputs, every_row, work.given.set,
                              work.given.cluster, options, work.given.inferred_direction});
@@ -133,6 +133,19 @@ Work prepare_under_gravity(Registered* whole, const std::vector<std::int32_t>& r
   robot->gravity = whole->frames.robot.gravity = *down;
   out->sanity.push_back(gravity_finding(*down));
   return prepare(part_of(*whole, rows));
+}
+
+/// Sections 3 to 6; again where a target turns out to be elsewhere than where the columns were taken.
+Decision decide_there(const Registered& whole, const std::vector<std::int32_t>& rows, const Robot& robot, Work* work) {
+  constexpr int kRounds = 6;
+  Decision out = decide(work, robot);
+  for (int round = 0; round < kRounds; ++round) {
+    const std::optional<Linearisation> next = where_it_leads(*work, out.state);
+    if (!next) break;
+    *work = prepare(part_of(whole, rows), next);
+    out = decide(work, robot);
+  }
+  return out;
 }
 
 void say_what_is_not_testable(const Work& work, Diagnosis* out) {
@@ -513,11 +526,11 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
                               " rows; fitted and judged on all");
   Work work = prepare_under_gravity(&whole, rows, &robot, &result);
   result.robot_before = whole.frames.robot;
-  say_what_is_not_testable(work, &result);
-  say_outliers(work, rows, &result);
 
   // 3. to 6. What explains it, and 7. how sure that is.
-  Decision decision = decide(&work, robot);
+  Decision decision = decide_there(whole, rows, robot, &work);
+  say_what_is_not_testable(work, &result);
+  say_outliers(work, rows, &result);
   const Evidence evidence = evidence_now(work);
   keep_what_is_confirmed(work, evidence, &decision);
   const Resampled resampled = resample(work, decision);

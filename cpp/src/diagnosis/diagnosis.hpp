@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -327,6 +328,12 @@ bool is_left_by(const Work& work, const Explanation& name, const UnknownEffect& 
 std::vector<Ground> grounds_of(const Work& work, const Decision& decision, const Resampled& resampled, int group,
                                const Sureness& sure, const UnseenErrors& without, const UnseenErrors& with,
                                bool unknown);
+
+// --- relinearise.cpp: of targets that the rows barely see ------------------------------------------------------------
+
+/// Where columns are to be taken next: at the base, targets and links of a state's solution. None: it is near enough,
+/// or the rows see the targets well.
+std::optional<Linearisation> where_it_leads(const Work& work, const Evidence::State& state);
 
 // --- refit.cpp: how far the error shrinks ----------------------------------------------------------------------------
 
