@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "math/constants.hpp"
 #include "math/linear_algebra.hpp"
@@ -192,46 +193,68 @@ struct Sums {
   Eigen::MatrixXd right;  ///< shape (k, columns of right)
 };
 
-Sums sums_of(const Trial& trial, const Design& design, const std::vector<InputColumn>& inputs,
-             const std::vector<Eigen::Index>& at, const Design::Rows& right) {
+/// Some columns of the design, times other columns: values of one row go together, for its inputs are one.
+struct SiteView {
+  std::vector<std::int32_t> rows;
+  Design::Rows products;  ///< of two sites, summed over a row's values: shape (rows, sites * sites)
+  Design::Rows right;     ///< of a site with every column: shape (rows * sites, columns of right)
+};
+
+SiteView view_of(const std::vector<int>& sites, const Design& design, const std::vector<Eigen::Index>& at,
+                 const Design::Rows& right) {
+  SiteView out;
+  for (const Eigen::Index i : at) {
+    const std::int32_t row = design.row[static_cast<std::size_t>(i)];
+    if (out.rows.empty() || out.rows.back() != row) out.rows.push_back(row);
+  }
+  const auto rows = static_cast<Eigen::Index>(out.rows.size()), count = static_cast<Eigen::Index>(sites.size());
+  out.products = Design::Rows::Zero(rows, count * count);
+  out.right = Design::Rows::Zero(rows * count, right.cols());
+  Eigen::VectorXd d(count);
+  Eigen::Index r = 0;
+  for (std::size_t n = 0; n < at.size(); ++n) {
+    if (out.rows[static_cast<std::size_t>(r)] != design.row[static_cast<std::size_t>(at[n])]) ++r;
+    for (Eigen::Index s = 0; s < count; ++s)
+      d[s] = design.weight[at[n]] * design.x(at[n], sites[static_cast<std::size_t>(s)]);
+    for (Eigen::Index s = 0; s < count; ++s) {
+      out.products.row(r).segment(s * count, count) += d[s] * d.transpose();
+      out.right.row(r * count + s) += d[s] * right.row(static_cast<Eigen::Index>(n));
+    }
+  }
+  return out;
+}
+
+Sums sums_of(const Trial& trial, const std::vector<InputColumn>& inputs, const SiteView& view) {
   const auto k1 = static_cast<Eigen::Index>(trial.what.knots[0].size());
   const auto k2 = trial.what.knots.size() > 1 ? static_cast<Eigen::Index>(trial.what.knots[1].size()) : 1;
-  const Eigen::Index per_site = k1 * k2, k = per_site * static_cast<Eigen::Index>(trial.sites.size());
+  const auto sites = static_cast<Eigen::Index>(trial.sites.size());
+  const Eigen::Index per_site = k1 * k2, k = per_site * sites;
   Sums out;
   out.xx = Eigen::MatrixXd::Zero(k, k);
-  Design::Rows sums = Design::Rows::Zero(k, right.cols());
+  Design::Rows sums = Design::Rows::Zero(k, view.right.cols());
   std::vector<double> first(static_cast<std::size_t>(k1)), second(static_cast<std::size_t>(k2), 1.0);
-  std::vector<std::pair<Eigen::Index, double>> hats, values;
-  std::int32_t last = -1;
-  for (std::size_t n = 0; n < at.size(); ++n) {
-    const Eigen::Index i = at[n];
-    const std::int32_t row = design.row[static_cast<std::size_t>(i)];
-    if (row != last) {
-      last = row;
-      hats_at(trial.what.knots[0],
-              inputs[static_cast<std::size_t>(trial.what.inputs[0])].values[static_cast<std::size_t>(row)],
-              first.data());
-      if (k2 > 1)
-        hats_at(trial.what.knots[1],
-                inputs[static_cast<std::size_t>(trial.what.inputs[1])].values[static_cast<std::size_t>(row)],
-                second.data());
-      hats.clear();
-      for (Eigen::Index a = 0; a < k1; ++a) {
-        for (Eigen::Index b = 0; b < k2; ++b) {
-          const double value = first[static_cast<std::size_t>(a)] * second[static_cast<std::size_t>(b)];
-          if (value != 0.0) hats.emplace_back(a * k2 + b, value);
-        }
+  std::vector<std::pair<Eigen::Index, double>> hats;
+  for (std::size_t n = 0; n < view.rows.size(); ++n) {
+    const auto row = static_cast<std::size_t>(view.rows[n]);
+    hats_at(trial.what.knots[0], inputs[static_cast<std::size_t>(trial.what.inputs[0])].values[row], first.data());
+    if (k2 > 1)
+      hats_at(trial.what.knots[1], inputs[static_cast<std::size_t>(trial.what.inputs[1])].values[row], second.data());
+    hats.clear();
+    for (Eigen::Index a = 0; a < k1; ++a) {
+      for (Eigen::Index b = 0; b < k2; ++b) {
+        const double value = first[static_cast<std::size_t>(a)] * second[static_cast<std::size_t>(b)];
+        if (value != 0.0) hats.emplace_back(a * k2 + b, value);
       }
     }
-    values.clear();
-    for (std::size_t s = 0; s < trial.sites.size(); ++s) {
-      const double d = design.weight[i] * design.x(i, trial.sites[s]);
-      for (const auto& [hat, value] : hats)
-        values.emplace_back(static_cast<Eigen::Index>(s) * per_site + hat, d * value);
-    }
-    for (const auto& [a, x] : values) {
-      for (const auto& [b, z] : values) out.xx(a, b) += x * z;
-      sums.row(a) += x * right.row(static_cast<Eigen::Index>(n));
+    const auto r = static_cast<Eigen::Index>(n);
+    for (Eigen::Index s = 0; s < sites; ++s) {
+      for (const auto& [a, x] : hats) {
+        for (Eigen::Index t = 0; t < sites; ++t) {
+          const double times = x * view.products(r, s * sites + t);
+          for (const auto& [b, z] : hats) out.xx(s * per_site + a, t * per_site + b) += times * z;
+        }
+        sums.row(s * per_site + a) += x * view.right.row(r * sites + s);
+      }
     }
   }
   out.right = sums;
@@ -319,8 +342,11 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
   out.tried = trials.size();
   std::vector<double> largest(static_cast<std::size_t>(options.flips) + 1, -1e300);  // the data's own first
   const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, out.tried)));
+  std::map<std::vector<int>, SiteView> views;  // by the columns that a function moves
   for (const Trial& trial : trials) {
-    const Sums sums = sums_of(trial, design, inputs, left.at, right);
+    auto view = views.find(trial.sites);
+    if (view == views.end()) view = views.emplace(trial.sites, view_of(trial.sites, design, left.at, right)).first;
+    const Sums sums = sums_of(trial, inputs, view->second);
     const Eigen::Index k = sums.xx.rows();
     const Eigen::MatrixXd c = sums.right.leftCols(p);
     const Eigen::MatrixXd half = left.factor.matrixL().solve(c.transpose());
