@@ -529,17 +529,16 @@ int Design::column(const std::string& name) const {
   return -1;
 }
 
-Gram Design::gram_of_fold(int wanted) const {
+Gram Design::gram_of_fold(int wanted, GramSum* sum) const {
   const Eigen::Index p = x.cols();
-  GramSum sum(p);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (fold[static_cast<std::size_t>(i)] != wanted || weight[i] == 0.0) continue;
-    double* out = sum.row();
+    double* out = sum->row();
     for (Eigen::Index k = 0; k < p; ++k) out[k * GramSum::stride()] = weight[i] * x(i, k);
     out[p * GramSum::stride()] = weight[i] * y[i];
-    sum.push();
+    sum->push();
   }
-  return sum.finish();
+  return sum->finish();
 }
 
 Design::Rows free_columns(const Design& design, const std::vector<int>& site_columns,

@@ -42,7 +42,7 @@ struct Design {
   Candidates candidates;
 
   int column(const std::string& name) const;
-  Gram gram_of_fold(int fold) const;
+  Gram gram_of_fold(int fold, GramSum* sum) const;
 };
 
 Design make_design(const DesignTask& task);

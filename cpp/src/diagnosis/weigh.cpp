@@ -181,9 +181,10 @@ class FlexibleFit {
     for (const Eigen::MatrixXd& part : xx_) xx += part;
     const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_prior(std::move(xx)));
     const Eigen::VectorXd solution = factor.solve(xy_);
+    const Eigen::MatrixXd inverse = upper_inverse(factor);
     used_ = {};
     for (std::size_t k = 0; k < kinds_.size(); ++k)
-      used_[static_cast<std::size_t>(kinds_[k])] = factor.solve(xx_[k]).trace();
+      used_[static_cast<std::size_t>(kinds_[k])] = trace_of_product(inverse, xx_[k]);
     for (Eigen::Index i = 0; i < residual_.size(); ++i) residual_[i] = design_.y[i] - fitted(i, solution);
   }
 
@@ -388,8 +389,9 @@ Grams make_grams(const Design& design, double design_effect, int threads) {
   const int folds = design.folds + design.test_folds;
   std::vector<Gram> grams(static_cast<std::size_t>(folds));
   const auto some = [&](int first) {
+    GramSum sum(design.x.cols());
     for (int f = first; f < folds; f += 2)
-      grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f), 1.0 / design_effect);
+      grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f, &sum), 1.0 / design_effect);
   };
   if (threads == 1) {
     some(0);

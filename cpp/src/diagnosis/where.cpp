@@ -19,27 +19,23 @@ namespace {
 constexpr int kResamples = 24;
 constexpr std::size_t kMostValues = 6000;
 
-/// Gram of the nuisance columns and some free functions, fold by fold.
-std::vector<Gram> fold_grams(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
-                             double design_effect) {
+/// Gram of the nuisance columns and some free functions, of the rows `at` that are in a fold; -1: in any.
+Gram gram_with(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
+               double design_effect, int fold, GramSum* sum) {
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size()), p = nuisance + more.cols();
-  std::vector<GramSum> sums(static_cast<std::size_t>(design.folds), GramSum(p));
   for (std::size_t n = 0; n < at.size(); ++n) {
     const Eigen::Index i = at[n];
-    GramSum& sum = sums[static_cast<std::size_t>(design.fold[static_cast<std::size_t>(i)])];
-    double* out = sum.row();
+    if (fold >= 0 && design.fold[static_cast<std::size_t>(i)] != fold) continue;
+    double* out = sum->row();
     for (Eigen::Index k = 0; k < nuisance; ++k)
       out[k * GramSum::stride()] = design.weight[i] * design.x(i, design.nuisance[static_cast<std::size_t>(k)]);
     for (Eigen::Index k = 0; k < more.cols(); ++k)
       out[(nuisance + k) * GramSum::stride()] = design.weight[i] * more(static_cast<Eigen::Index>(n), k);
     out[p * GramSum::stride()] = design.weight[i] * design.y[i];
-    sum.push();
+    sum->push();
   }
-  std::vector<Gram> out;
-  for (GramSum& sum : sums) {
-    out.emplace_back();
-    out.back().add(sum.finish(), 1.0 / design_effect);
-  }
+  Gram out;
+  out.add(sum->finish(), 1.0 / design_effect);
   return out;
 }
 
@@ -88,7 +84,7 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
   for (Eigen::Index k = 0; k < p; ++k) d(k, k) += 1e-10 * gram.xx(k, k) + (k < nuisance ? 0.0 : 1.0 / (1e-3 * 1e-3));
   const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
   const double after = gram.yy - gram.xy.dot(factor.solve(gram.xy));
-  const double used = factor.solve(gram.xx).trace() - static_cast<double>(nuisance);
+  const double used = trace_of_product(upper_inverse(factor), gram.xx) - static_cast<double>(nuisance);
   const double noise = after / std::max(1.0, gram.n - static_cast<double>(nuisance) - used);
   *closable = std::max(before - noise * std::max(1.0, gram.n - static_cast<double>(nuisance)), 1e-300);
   return std::max(0.0, before - after - used * noise);
@@ -96,8 +92,11 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
 
 Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
                double design_effect, double closable, std::uint64_t seed) {
-  const std::vector<Gram> folds = fold_grams(design, more, at, design_effect);
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
+  GramSum sum(nuisance + more.cols());
+  std::vector<Gram> folds;
+  for (int fold = 0; fold < design.folds; ++fold)
+    folds.push_back(gram_with(design, more, at, design_effect, fold, &sum));
   Gram all;
   for (const Gram& fold : folds) all.add(fold);
   double own = 0.0;
@@ -136,11 +135,9 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
   for (const std::vector<int>& columns : design.joint_column)
     every_site.insert(every_site.end(), columns.begin(), columns.end());
   const auto gram_at_every_site = [&](const std::vector<int>& which, int most_knots) {
-    Gram gram;
-    for (const Gram& fold :
-         fold_grams(design, functions_of(design, inputs, at, every_site, which, most_knots), at, design_effect))
-      gram.add(fold);
-    return gram;
+    const Design::Rows functions = functions_of(design, inputs, at, every_site, which, most_knots);
+    GramSum sum(nuisance + functions.cols());
+    return gram_with(design, functions, at, design_effect, -1, &sum);
   };
   // What is closable at all: every joint by its own motion and direction, and by torque, together.
   double closable = 0.0, own = 0.0;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "kernel/kernel.hpp"
 #include "math/linear_algebra.hpp"
@@ -118,7 +119,29 @@ Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d) {
   return factor;
 }
 
-GramSum::GramSum(Eigen::Index columns) : columns_(columns), buffer_(Eigen::MatrixXd::Zero(kLength, columns + 1)) {
+// A^-1 = L^-T L^-1, by blocks of columns of L^-1, which are zero above the diagonal.
+Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  constexpr Eigen::Index kBlock = 64;
+  const Eigen::MatrixXd& L = factor.matrixLLT();
+  const Eigen::Index n = L.rows();
+  Eigen::MatrixXd half = Eigen::MatrixXd::Identity(n, n), out(n, n);
+  for (Eigen::Index first = 0; first < n; first += kBlock) {
+    const Eigen::Index below = n - first, count = std::min(kBlock, below), last = first + count;
+    auto columns = half.block(first, first, below, count);
+    L.bottomRightCorner(below, below).triangularView<Eigen::Lower>().solveInPlace(columns);
+    out.block(0, first, last, count).noalias() = half.block(first, 0, below, last).transpose() * columns;
+  }
+  return out;
+}
+
+double trace_of_product(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& whole) {
+  double out = 0.0;
+  for (Eigen::Index k = 0; k < whole.cols(); ++k)
+    out += 2.0 * upper.col(k).head(k).dot(whole.col(k).head(k)) + upper(k, k) * whole(k, k);
+  return out;
+}
+
+GramSum::GramSum(Eigen::Index columns) : columns_(columns), buffer_(kLength, columns + 1) {
   sums_.assign(kernel::functions().gram_size(static_cast<int>(columns + 1)), 0.0);
 }
 
@@ -128,9 +151,10 @@ void GramSum::push() {
 }
 
 void GramSum::fold_in() {
-  if (filled_ < kLength) buffer_.bottomRows(kLength - filled_).setZero();
-  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1), 0,
-                               static_cast<int>((filled_ + 7) / 8 * 8), sums_.data());
+  const Eigen::Index length = (filled_ + 7) / 8 * 8;  // in whole lanes of any kernel
+  buffer_.middleRows(filled_, length - filled_).setZero();
+  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1), 0, static_cast<int>(length),
+                               sums_.data());
   filled_ = 0;
 }
 
@@ -142,7 +166,7 @@ Gram GramSum::finish() {
   out.xx = all.topLeftCorner(columns_, columns_).selfadjointView<Eigen::Upper>();
   out.xy = all.col(columns_).head(columns_);
   out.yy = all(columns_, columns_);
-  out.n = n_;
+  out.n = std::exchange(n_, 0.0);
   return out;
 }
 

@@ -31,6 +31,11 @@ struct Gram {
 /// Cholesky, with ever more added to the diagonal where rounding has made the matrix indefinite.
 Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d);
 
+/// The upper triangle of A^-1, for A = L L^T.
+Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor);
+/// Trace of the product of two symmetric matrices, of one of which only the upper triangle is given.
+double trace_of_product(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& whole);
+
 /// Sums weighted rows to a Gram, on the kernel that the processor is best at.
 class GramSum {
  public:
@@ -39,6 +44,7 @@ class GramSum {
   double* row() { return buffer_.data() + filled_; }
   static constexpr Eigen::Index stride() { return kLength; }
   void push();
+  /// The Gram of the rows since the last one.
   Gram finish();
 
  private:
