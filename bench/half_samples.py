@@ -8,8 +8,9 @@ The poses of each recording are parted in two halves at random, repeats of a pos
 is run on either. Two fits to different poses differ by sqrt(s1^2 + s2^2) where their standard errors s1, s2
 are right. Printed are the rms of these ratios over all parameters and splits, and their median over that of
 a normal number, which a few parameters that are hardly seen do not move. 1: the errors are the scatter.
-Where links are fitted near the nominal robot, those do not count of which the prior says as much as the
-rows or more: both halves have them where the nominal robot does.
+Where links are fitted near the nominal robot, parameters do not count of whose variance their prior has
+as much as the rows or more: both halves have these where the nominal robot does, and so a base that the rows
+can hardly tell from the first links.
 """
 
 from __future__ import annotations
@@ -36,17 +37,18 @@ def poses_of(data: truing.Measurements) -> Any:
 
 
 def seen(robot: truing.Robot, found: Identification) -> list[Any]:
-    """Fitted parameters that the rows say more of than a prior."""
+    """Fitted parameters that the rows say more of than a prior of the links.
+
+    To first order C = H^-1 of H = J^T J / noise^2 + P, with P = 1 / shrunk_to^2 for links: of a variance the
+    prior has what C P C has of C.
+    """
+    fitted = [p for p in found.parameters if not p.frozen]
+    if not found.shrunk_to > 0.0:
+        return [p for p in fitted if p.sigma > 0.0]
     joints = {joint.name for joint in robot.joints}
-    return [
-        p
-        for p in found.parameters
-        if not p.frozen
-        and p.sigma > 0.0
-        and not (
-            found.shrunk_to > 0.0 and p.name.split(".")[0] in joints and p.sigma**2 > 0.5 * found.shrunk_to**2
-        )
-    ]
+    links = [k for k, p in enumerate(fitted) if p.name.split(".")[0] in joints]
+    by_prior = (np.asarray(found.covariance)[:, links] ** 2).sum(axis=1) / found.shrunk_to**2
+    return [p for p, part in zip(fitted, by_prior, strict=True) if p.sigma > 0.0 and part <= 0.5 * p.sigma**2]
 
 
 def ratios(
