@@ -391,6 +391,14 @@ std::map<int, int> departures_from_laws(const Work& work, const Evidence& eviden
       if (may_be_warmth(work, named(less), named(group))) warmth.push_back(less);
     }
     for (const int g : left_by_warmth(work, evidence, decision, warmth, named(group))) out[g] = group;
+    // What comes late may be more than what comes at once.
+    for (std::size_t small = large + 1; small < laws.size() && out.count(group) == 0; ++small) {
+      const int less = laws[small].second;
+      const bool of_time = effect_traits(work, named(group)).driver == Driver::time && out.count(less) == 0;
+      if (of_time && may_be_warmth(work, named(group), named(less)) &&
+          !stand_by_themselves(work, evidence, decision, {group}, named(less)))
+        out[group] = less;
+    }
   }
   return out;
 }

@@ -133,16 +133,18 @@ def test_what_a_joint_that_hardens_leaves_is_no_harmonic(which: str, joint: str)
     assert [(e.effect, e.joints) for e in found.effects] == [("joint_compliance", (joint,))]
 
 
-def test_what_a_zero_that_warms_late_leaves_is_no_drift() -> None:
-    """A rate of the base of .94 beside it."""
-    robot, data, _ = make("examination/wrong_law/1@42")
+@pytest.mark.parametrize("which", ["examination/wrong_law/1@42", "examination/wrong_law/33@9971"])
+def test_what_a_zero_that_warms_late_leaves_is_no_drift(which: str) -> None:
+    """A rate of the base of .94 beside it, and a drift of .99 that was larger than what came at once."""
+    robot, data, _ = make(which)
     assert [(e.effect, e.joints) for e in truing.diagnose(robot, data).effects] == [("thermal_zero", ("J1",))]
 
 
 def test_a_drift_that_the_first_joint_may_be_is_said_with_its_zero() -> None:
     """Its temperature was recorded, and its zero follows that late: a drift, .99 sure."""
-    robot, data, _ = make("examination/wrong_law/33@9971")
-    (drift,) = [e for e in truing.diagnose(robot, data).effects if e.effect == "drift"]
+    robot, data, _ = make("development/wrong_law/9@10021")
+    (drift,) = truing.diagnose(robot, data).effects
+    assert drift.effect == "drift"
     assert ("thermal_zero", ("J1",)) in [(one.effect, one.joints) for one in drift.confounded_with]
 
 
