@@ -11,6 +11,7 @@ further joint.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ LENGTH = 0.1  # [m] of the lever
 DISTANCE = 10.0  # [m] of the other end
 _ZEROS = 90  # angles tried for `zero`, in half a turn
 _WORTH = 0.75  # of what Coulomb friction and damping leave: a lever that leaves more is not written
+
+_ROUNDING = 1e-9  # of the largest friction: what least squares leave where nothing is left
 
 
 @dataclass(frozen=True)
@@ -40,21 +43,32 @@ class Lever:
 
 
 def lever_for(friction: Floats, q: Floats, qd: Floats) -> Lever | None:
-    """The best lever by least squares; none where Coulomb friction and damping are nearly as good.
+    """The best lever by least squares, its slope not below zero (damping that pushes); none where Coulomb
+    friction and damping are nearly as good.
 
     friction: without its sign [Nm]; q [rad] and qd [rad/s]: of the simulator's joint; all shape=(n,).
     """
-    plain = np.column_stack([np.ones_like(qd), np.abs(qd)])
+    still, speed = np.ones_like(qd), np.abs(qd)
+    _, without = _least_squares([still, speed], friction)
+    if without <= _ROUNDING * float(np.abs(friction).max()):
+        return None
     best: Lever | None = None
     for zero in np.arange(_ZEROS) * (np.pi / _ZEROS):
-        columns = np.column_stack([plain, np.abs(np.sin(q - zero))])
-        constant, slope, amplitude = (values := np.linalg.lstsq(columns, friction, rcond=None)[0]).tolist()
-        left = float(np.sqrt(np.mean((friction - columns @ values) ** 2)))
+        turned = np.abs(np.sin(q - zero))
+        (constant, amplitude, slope), left = _least_squares([still, turned, speed], friction)
+        if slope < 0.0:
+            (constant, amplitude), left = _least_squares([still, turned], friction)
+            slope = 0.0
         if amplitude > 0.0 and (best is None or left < best.left):
             best = Lever(constant, slope, amplitude, float(zero), left)
-    values = np.linalg.lstsq(plain, friction, rcond=None)[0]
-    without = float(np.sqrt(np.mean((friction - plain @ values) ** 2)))
     return best if best is not None and best.left < _WORTH * without else None
+
+
+def _least_squares(columns: Sequence[Floats], wanted: Floats) -> tuple[list[float], float]:
+    """Values, and the root mean square of what they leave."""
+    table = np.column_stack(columns)
+    values = np.linalg.lstsq(table, wanted, rcond=None)[0]
+    return values.tolist(), float(np.sqrt(np.mean((wanted - table @ values) ** 2)))
 
 
 def ends(axis: Floats, zero: float) -> tuple[Floats, Floats]:
