@@ -338,8 +338,7 @@ static InputColumn motion_by(const Work& work, const Evidence::State& state, int
   const ColumnGroup& group = work.design.candidates.groups[static_cast<std::size_t>(law)];
   const Eigen::VectorXd theta = solution_of(state, group);
   const int unit = work.design.joint_column[joint][0];
-  InputColumn out{"", "rad", static_cast<int>(joint), false,
-                  std::vector<double>(work.inputs.front().values.size(), 0.0)};
+  InputColumn out{"", "", static_cast<int>(joint), false, std::vector<double>(work.inputs.front().values.size(), 0.0)};
   std::vector<double> squares(out.values.size(), 0.0);
   for (Eigen::Index i = 0; i < work.design.x.rows(); ++i) {
     const auto row = static_cast<std::size_t>(work.design.row[static_cast<std::size_t>(i)]);
