@@ -534,8 +534,8 @@ Gram Design::gram_of_fold(int wanted, GramSum* sum) const {
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (fold[static_cast<std::size_t>(i)] != wanted || weight[i] == 0.0) continue;
     double* out = sum->row();
-    for (Eigen::Index k = 0; k < p; ++k) out[k * GramSum::stride()] = weight[i] * x(i, k);
-    out[p * GramSum::stride()] = weight[i] * y[i];
+    for (Eigen::Index k = 0; k < p; ++k) out[k] = weight[i] * x(i, k);
+    out[p] = weight[i] * y[i];
     sum->push();
   }
   return sum->finish();

@@ -120,7 +120,7 @@ void Springs::add_rows(const Work& work) {
     double* out = sum.row();
     const auto put = [&](double value) {
       *out = weight * value;
-      out += GramSum::stride();
+      ++out;
     };
     const auto row = static_cast<std::size_t>(design.row[at]);
     const auto motion = [&](std::size_t joint) { return design.x(i, design.joint_column[joint][0]); };

@@ -30,7 +30,7 @@ static Gram sum_of(const Design& design, const Eigen::VectorXd& weight, const st
     double* out = sum.row();
     for (const int column : columns) {
       *out = weight[i] * design.x(i, column);
-      out += GramSum::stride();
+      ++out;
     }
     *out = weight[i] * design.y[i];
     sum.push();

@@ -28,10 +28,10 @@ Gram gram_with(const Design& design, const Design::Rows& more, const std::vector
     if (fold >= 0 && design.fold[static_cast<std::size_t>(i)] != fold) continue;
     double* out = sum->row();
     for (Eigen::Index k = 0; k < nuisance; ++k)
-      out[k * GramSum::stride()] = design.weight[i] * design.x(i, design.nuisance[static_cast<std::size_t>(k)]);
+      out[k] = design.weight[i] * design.x(i, design.nuisance[static_cast<std::size_t>(k)]);
     for (Eigen::Index k = 0; k < more.cols(); ++k)
-      out[(nuisance + k) * GramSum::stride()] = design.weight[i] * more(static_cast<Eigen::Index>(n), k);
-    out[p * GramSum::stride()] = design.weight[i] * design.y[i];
+      out[nuisance + k] = design.weight[i] * more(static_cast<Eigen::Index>(n), k);
+    out[p] = design.weight[i] * design.y[i];
     sum->push();
   }
   Gram out;

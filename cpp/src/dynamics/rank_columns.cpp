@@ -56,29 +56,23 @@ struct JointFold {
   Gram gram;
 };
 
-/// One joint's and one fold's rows, written column by column into blocks that the kernel sums.
+/// One joint's and one fold's rows.
 JointFold sum_joint(const std::vector<ColumnValues>& columns, const ColumnRows& of, int joint,
                     const std::vector<Index>& rows) {
   const Index joints = of.weight.size();
   JointFold out;
   for (std::size_t k = 0; k < columns.size(); ++k)
     if (columns[k].joint < 0 || columns[k].joint == joint) out.columns.push_back(static_cast<int>(k));
-  constexpr auto kBlock = static_cast<std::size_t>(GramSum::stride());
   const double weight = of.weight[joint] * std::sqrt(static_cast<double>(of.every));
   GramSum sum(static_cast<Index>(out.columns.size()));
-  for (std::size_t begin = 0; begin < rows.size(); begin += kBlock) {
-    const std::size_t count = std::min(kBlock, rows.size() - begin);
+  for (const Index row : rows) {
     double* to = sum.row();
-    const auto write = [&](const double* from, Index step, Index first) {
-      for (std::size_t i = 0; i < count; ++i) to[i] = weight * from[rows[begin + i] * step + first];
-      to += GramSum::stride();
-    };
     for (const int k : out.columns) {
       const ColumnValues& column = columns[static_cast<std::size_t>(k)];
-      write(column.values, column.joint < 0 ? joints : 1, column.joint < 0 ? joint : 0);
+      *to++ = weight * column.values[column.joint < 0 ? row * joints + joint : row];
     }
-    write(of.measured, joints, joint);
-    for (std::size_t i = 0; i < count; ++i) sum.push();
+    *to = weight * of.measured[row * joints + joint];
+    sum.push();
   }
   out.gram = sum.finish();
   return out;

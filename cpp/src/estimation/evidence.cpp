@@ -141,8 +141,21 @@ double trace_of_product(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& who
   return out;
 }
 
-GramSum::GramSum(Eigen::Index columns) : columns_(columns), buffer_(kLength, columns + 1) {
-  sums_.assign(kernel::functions().gram_size(static_cast<int>(columns + 1)), 0.0);
+/// A symmetric matrix of which the upper triangle is given, by blocks that a cache can hold.
+template <typename Upper>
+static Eigen::MatrixXd whole_of_upper(const Upper& upper, Eigen::Index n) {
+  constexpr Eigen::Index kBlock = 32;
+  Eigen::MatrixXd out(n, n);
+  for (Eigen::Index i = 0; i < n; i += kBlock) {
+    const Eigen::Index rows = std::min(kBlock, n - i);
+    out.block(i, i, rows, rows) = upper.block(i, i, rows, rows).template selfadjointView<Eigen::Upper>();
+    for (Eigen::Index j = i + kBlock; j < n; j += kBlock) {
+      const Eigen::Index columns = std::min(kBlock, n - j);
+      out.block(i, j, rows, columns) = upper.block(i, j, rows, columns);
+      out.block(j, i, columns, rows) = upper.block(i, j, rows, columns).transpose();
+    }
+  }
+  return out;
 }
 
 void GramSum::push() {
@@ -151,21 +164,19 @@ void GramSum::push() {
 }
 
 void GramSum::fold_in() {
-  const Eigen::Index length = (filled_ + 7) / 8 * 8;  // in whole lanes of any kernel
-  buffer_.middleRows(filled_, length - filled_).setZero();
-  kernel::functions().gram_add(buffer_.data(), kLength, static_cast<int>(columns_ + 1), 0, static_cast<int>(length),
-                               sums_.data());
+  const bool first = n_ <= static_cast<double>(kLength);
+  if (first) sums_.resize(rows_.cols(), rows_.cols());
+  kernel::functions().gram_add_rows(rows_.data(), static_cast<int>(rows_.cols()), static_cast<int>(filled_), first,
+                                    sums_.data());
   filled_ = 0;
 }
 
 Gram GramSum::finish() {
-  if (filled_ > 0) fold_in();
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(columns_ + 1, columns_ + 1);
-  kernel::functions().gram_reduce(sums_.data(), static_cast<int>(columns_ + 1), all.data());
+  if (filled_ > 0 || n_ == 0.0) fold_in();
   Gram out;
-  out.xx = all.topLeftCorner(columns_, columns_).selfadjointView<Eigen::Upper>();
-  out.xy = all.col(columns_).head(columns_);
-  out.yy = all(columns_, columns_);
+  out.xx = whole_of_upper(sums_, columns_);
+  out.xy = sums_.col(columns_).head(columns_);
+  out.yy = sums_(columns_, columns_);
   out.n = std::exchange(n_, 0.0);
   return out;
 }
@@ -183,6 +194,10 @@ Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std
                    const Eigen::VectorXd& prior, Nuisance treated)
     : gram_(gram), groups_(groups), nuisance_(std::move(nuisance)), prior_(prior) {
   degrees_of_freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
+GramSum::GramSum(Eigen::Index columns)
+    : columns_(columns),
+      rows_(Rows::Zero(kLength, (columns + kernel::kRowColumns) / kernel::kRowColumns * kernel::kRowColumns)) {}
+
   if (treated == Nuisance::in_factor || nuisance_.empty()) return;
   eliminated_ = nuisance_.size();
   Eigen::MatrixXd d = block(gram.xx, nuisance_, nuisance_);

@@ -40,9 +40,8 @@ double trace_of_product(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& who
 class GramSum {
  public:
   explicit GramSum(Eigen::Index columns);
-  /// Room for one row: write value k to row()[k * stride()], the measured value last, then push().
-  double* row() { return buffer_.data() + filled_; }
-  static constexpr Eigen::Index stride() { return kLength; }
+  /// Room for one row: write its values, the measured one last, then push().
+  double* row() { return rows_.data() + filled_ * rows_.cols(); }
   void push();
   /// The Gram of the rows since the last one.
   Gram finish();
@@ -54,8 +53,9 @@ class GramSum {
   Eigen::Index columns_;
   Eigen::Index filled_ = 0;
   double n_ = 0.0;
-  Eigen::MatrixXd buffer_;    ///< shape (kLength, columns + 1)
-  std::vector<double> sums_;  ///< the kernel's own
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Rows rows_;  ///< shape (kLength, columns + 1 and what the kernel needs more)
+  Rows sums_;  ///< upper triangle of the products of these columns, once something was folded in
 };
 
 /// Columns that come and go together, as the search sees them.

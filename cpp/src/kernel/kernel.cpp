@@ -393,6 +393,54 @@ void gram_reduce(double* acc, int columns, double* out) {
   });
 }
 
+// Gram of rows, whose numbers are neighbours: lanes are columns here, and no sum of lanes is left to be added up. A
+// block has kRowsLeft columns by as many as kRowsRight packs have.
+#if TRUING_LANES == 8
+constexpr int kRowsLeft = 8, kRowsRight = 2;  // 16 of 32 registers
+#else
+constexpr int kRowsLeft = 4, kRowsRight = 2;  // 8 of 16 registers
+#endif
+static_assert(kRowColumns % kRowsLeft == 0 && kRowColumns % (kRowsRight * kLanes) == 0, "whole blocks in every copy");
+
+// out (+)= the products of a block, row by row. Not inlined: the sums then stay in registers through the loop.
+template <bool first>
+__attribute__((noinline)) void rows_product(const double* left, const double* right, std::ptrdiff_t stride, int count,
+                                            double* out) {
+  Pack sum[kRowsLeft][kRowsRight];
+  for (int m = 0; m < kRowsLeft; ++m)
+    for (int n = 0; n < kRowsRight; ++n) sum[m][n] = first ? Pack{} : load(out + m * stride + n * kLanes);
+  for (int k = 0; k < count; ++k, left += stride, right += stride) {
+    Pack there[kRowsRight];
+    for (int n = 0; n < kRowsRight; ++n) there[n] = load(right + n * kLanes);
+    for (int m = 0; m < kRowsLeft; ++m)
+      for (int n = 0; n < kRowsRight; ++n) sum[m][n] += left[m] * there[n];
+  }
+  for (int m = 0; m < kRowsLeft; ++m)
+    for (int n = 0; n < kRowsRight; ++n) store(out + m * stride + n * kLanes, sum[m][n]);
+}
+
+bool are_zero(const double* rows, std::ptrdiff_t stride, int count) {
+  for (int k = 0; k < count; ++k)
+    for (int c = 0; c < kRowColumns; c += kLanes)
+      if (!is_zero(rows + k * stride + c, kLanes)) return false;
+  return true;
+}
+
+void gram_add_rows(const double* rows, int columns, int count, bool first, double* out) {
+  for (int i = 0; i < columns; i += kRowColumns) {
+    // Many columns act now and then only, and what is nought adds nothing.
+    const bool zero = are_zero(rows + i, columns, count);
+    if (zero && !first) continue;
+    for (int m = i; m < i + kRowColumns; m += kRowsLeft) {
+      for (int j = i; j < columns; j += kRowsRight * kLanes) {
+        double* const to = out + static_cast<std::ptrdiff_t>(m) * columns + j;
+        first ? rows_product<true>(rows + m, rows + j, columns, zero ? 0 : count, to)
+              : rows_product<false>(rows + m, rows + j, columns, count, to);
+      }
+    }
+  }
+}
+
 // Squares of C row: so many lanes at a time stay in registers through the columns.
 void add_squared(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out) {
   constexpr int kPacks = 6;
@@ -483,6 +531,7 @@ const Functions table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE),
                       gram_add,
                       gram_add_columns,
                       gram_reduce,
+                      gram_add_rows,
                       add_squared,
                       filter};
 

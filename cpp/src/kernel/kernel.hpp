@@ -96,6 +96,9 @@ constexpr std::size_t filter_scratch(int step, int weight_count, int count) {
   return static_cast<std::size_t>(step) * static_cast<std::size_t>(count + weight_count / step + 1);
 }
 
+/// Rows for gram_add_rows have a multiple of so many numbers.
+constexpr int kRowColumns = 16;
+
 /// Accumulator of a Gram matrix; `size` doubles, opaque between gram_clear and gram_reduce.
 struct Functions {
   const char* name;
@@ -109,6 +112,10 @@ struct Functions {
   void (*gram_add_columns)(const double* const* c, int columns, int known, int length, double* acc);
   /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
   void (*gram_reduce)(double* acc, int columns, double* out);
+  /// The same of `count` rows that stand one after the other, `columns` doubles each (a multiple of kRowColumns), for
+  /// few rows at a time: out[i * columns + j] += sum of row[i] row[j], for j >= i at least. `first`: instead of what is
+  /// there.
+  void (*gram_add_rows)(const double* rows, int columns, int count, bool first, double* out);
   /// out[i] += (sum over k of row[k] c[k * stride + i])^2 for i below `length` (a multiple of kTilePoses).
   void (*add_squared)(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out);
   /// out[i] = sum over k of weights[k] x[i * step + k], of `count` rows (a multiple of 8). `x` holds (count - 1) * step

@@ -374,6 +374,22 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
       for (int i = 0; i <= j; ++i)
         CHECK(placed[j * columns + i] == (is_nought(i) || is_nought(j) ? 0.0 : out[j * columns + i]));
     }
+    // Rows whose numbers are neighbours, in two lots, some columns of the first nought.
+    const int padded = 3 * truing::kernel::kRowColumns, lot = 7;
+    std::vector<double> rows(static_cast<std::size_t>(2 * lot * padded), 0.0), sums(padded * padded, -1.0);
+    for (int k = 0; k < 2 * lot; ++k)
+      for (int i = 0; i < padded; ++i)
+        if (k >= lot || i < truing::kernel::kRowColumns)
+          rows[static_cast<std::size_t>(k * padded + i)] = c[static_cast<std::size_t>(k * padded + i)];
+    f->gram_add_rows(rows.data(), padded, lot, true, sums.data());
+    f->gram_add_rows(rows.data() + lot * padded, padded, lot, false, sums.data());
+    for (int i = 0; i < padded; ++i) {
+      for (int j = i; j < padded; ++j) {
+        double sum = 0.0;
+        for (int k = 0; k < 2 * lot; ++k) sum += rows[k * padded + i] * rows[k * padded + j];
+        CHECK(sums[i * padded + j] == doctest::Approx(sum).scale(1).epsilon(1e-14));
+      }
+    }
     // Squares of a row of numbers times the columns.
     std::vector<double> squares(length, 1.0);
     f->add_squared(c.data(), length, expected.data(), columns, length, squares.data());

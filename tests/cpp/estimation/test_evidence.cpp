@@ -84,8 +84,8 @@ TEST_CASE("sums of rows equal the dense product, whatever the number of columns 
       GramSum sum(columns);
       for (Eigen::Index i = 0; i < rows; ++i) {
         double* out = sum.row();
-        for (Eigen::Index k = 0; k < columns; ++k) out[k * GramSum::stride()] = x(i, k);
-        out[columns * GramSum::stride()] = y[i];
+        for (Eigen::Index k = 0; k < columns; ++k) out[k] = x(i, k);
+        out[columns] = y[i];
         sum.push();
       }
       const Gram got = sum.finish(), expected = gram_of(x, y);
