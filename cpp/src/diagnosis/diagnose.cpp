@@ -117,7 +117,7 @@ Work prepare(Registered given, const std::optional<Linearisation>& there = {}) {
                              work.given.cluster, options, work.given.inferred_direction});
   work.samplings = samplings(work.design, work.inputs, robot);
   say_what_angles_cannot_show(work.samplings, robot, &work.design.candidates.not_testable);
-  Weighted weighted = weigh(work.design, data);
+  Weighted weighted = weigh(work.design, data, options.threads);
   work.design.weight = std::move(weighted.weight);
   work.noise = std::move(weighted.noise);
   work.grams = make_grams(work.design, work.noise.design_effect, options.threads);

@@ -135,7 +135,7 @@ struct Weighted {
 };
 
 /// Each kind of value by its own noise, what stands far out by less. The noise is what the flexible model leaves.
-Weighted weigh(const Design& design, const Measurements& data);
+Weighted weigh(const Design& design, const Measurements& data, int threads);
 /// Noise of a position or distance value, as a choice leaves it [m]: where there are rotations, too, `State::sigma2` is
 /// of both. Each kind's squares over its values less the effective parameters that they determine.
 double noise_of_positions(const Work& work, const Evidence::State& state);

@@ -11,8 +11,8 @@
 #include <iterator>
 #include <map>
 #include <set>
-#include <thread>
 
+#include "math/batch.hpp"
 #include "math/statistics.hpp"
 
 namespace truing::diagnosis {
@@ -167,42 +167,64 @@ namespace {
 /// noise.
 class FlexibleFit {
  public:
-  FlexibleFit(const Design& design, std::vector<int> columns)
-      : design_(design), columns_(std::move(columns)), residual_(design.y) {
+  FlexibleFit(const Design& design, std::vector<int> columns, int threads)
+      : design_(design), columns_(std::move(columns)), threads_(threads), residual_(design.y) {
     std::set<int> kinds;
     for (const std::int8_t component : design.component) kinds.insert(kind_of(component));
     kinds_.assign(kinds.begin(), kinds.end());
   }
 
-  /// `uniform`: the one noise that all rows are weighted with; 0: weights differ from row to row.
-  void fit(const Eigen::VectorXd& weight, double uniform) {
-    sum(weight, uniform);
-    Eigen::MatrixXd xx = Eigen::MatrixXd::Zero(xy_.size(), xy_.size());
-    for (const Eigen::MatrixXd& part : xx_) xx += part;
-    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_prior(std::move(xx)));
-    const Eigen::VectorXd solution = factor.solve(xy_);
-    const Eigen::MatrixXd inverse = upper_inverse(factor);
+  /// Sums rows with these weights. `uniform`: the one noise that all are weighted with, and then the sums of the time
+  /// before only change their scale; 0: weights differ from row to row.
+  void sum(const Eigen::VectorXd& weight, double uniform) {
+    if (uniform > 0.0 && summed_at_ > 0.0) {
+      for (Gram& part : parts_) part.scale(std::pow(summed_at_ / uniform, 2.0));
+    } else {
+      parts_.assign(kParts * kinds_.size(), {});
+      const auto work = [&](std::size_t k) {
+        const auto wanted = [&](std::int32_t fold, int kind) {
+          return part_of(fold) == k % kParts && kind == kinds_[k / kParts];
+        };
+        parts_[k] = sum_of(design_, weight, columns_, wanted);
+      };
+      for_each_on_threads(parts_.size(), threads_, {}, work, 1);
+    }
+    summed_at_ = uniform;
+  }
+
+  /// To what was summed.
+  void fit() {
+    const Gram all = total([](std::size_t, std::size_t) { return true; });
+    const Eigen::VectorXd precision = precision_of(all);
+    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_diagonal(all.xx, precision));
+    const Eigen::VectorXd solution = factor.solve(all.xy);
     used_ = {};
-    for (std::size_t k = 0; k < kinds_.size(); ++k)
-      used_[static_cast<std::size_t>(kinds_[k])] = trace_of_product(inverse, xx_[k]);
+    if (kinds_.size() == 1) {
+      // The trace of A^-1 (A - P) with a diagonal P.
+      used_[static_cast<std::size_t>(kinds_[0])] =
+          static_cast<double>(precision.size()) - precision.dot(diagonal_of_inverse(factor, threads_));
+    } else {
+      const Eigen::MatrixXd inverse = upper_inverse(factor, threads_);
+      for (std::size_t k = 0; k < kinds_.size(); ++k) {
+        const Gram of_kind = total([&](std::size_t, std::size_t kind) { return kind == k; });
+        used_[static_cast<std::size_t>(kinds_[k])] = trace_of_product(inverse, of_kind.xx);
+      }
+    }
     for (Eigen::Index i = 0; i < residual_.size(); ++i) residual_[i] = design_.y[i] - fitted(i, solution);
   }
 
   /// What every part of the training folds shows of a fit to the others.
-  Eigen::VectorXd predicted_residual(const Eigen::VectorXd& weight) const {
-    constexpr std::int32_t kParts = 4;
-    std::vector<Gram> parts;
-    Gram all;
-    for (std::int32_t part = 0; part < kParts; ++part) {
-      parts.push_back(sum_of(design_, weight, columns_, [&](std::int32_t fold, int) { return fold % kParts == part; }));
-      all.add(parts.back());
-    }
-    std::vector<Eigen::VectorXd> solutions;
-    for (const Gram& own : parts) solutions.push_back(factorised(with_prior(all.xx - own.xx)).solve(all.xy - own.xy));
+  Eigen::VectorXd predicted_residual() const {
+    std::array<Eigen::VectorXd, kParts> solutions;
+    const auto work = [&](std::size_t held_out) {
+      const Gram others = total([&](std::size_t part, std::size_t) { return part != held_out; });
+      solutions[held_out] = factorised(with_diagonal(others.xx, precision_of(others))).solve(others.xy);
+    };
+    for_each_on_threads(kParts, threads_, {}, work, 1);
     Eigen::VectorXd out = residual_;
     for (Eigen::Index i = 0; i < out.size(); ++i) {
       const std::int32_t fold = design_.fold[static_cast<std::size_t>(i)];
-      if (fold < design_.folds) out[i] = design_.y[i] - fitted(i, solutions[static_cast<std::size_t>(fold % kParts)]);
+      if (fold < design_.folds) out[i] = design_.y[i] - fitted(i, solutions[part_of(fold)]);
     }
     return out;
   }
@@ -213,12 +235,29 @@ class FlexibleFit {
   const ByKind& used() const { return used_; }
 
  private:
-  Eigen::MatrixXd with_prior(Eigen::MatrixXd xx) const {
-    for (Eigen::Index c = 0; c < xx.cols(); ++c) {
-      const bool flat = c < static_cast<Eigen::Index>(design_.nuisance.size());
-      xx(c, c) +=
-          flat ? 1e-9 * xx(c, c) + 1e-30 : std::pow(0.05 * design_.prior[columns_[static_cast<std::size_t>(c)]], -2.0);
+  static constexpr std::size_t kParts = 4;
+  static std::size_t part_of(std::int32_t fold) { return static_cast<std::size_t>(fold) % kParts; }
+
+  /// The sums of some parts and kinds.
+  template <typename Wanted>
+  Gram total(const Wanted& wanted) const {
+    Gram out;
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      if (wanted(k % kParts, k / kParts)) out.add(parts_[k]);
     }
+    return out;
+  }
+
+  /// Of the prior: flat for the nuisance.
+  Eigen::VectorXd precision_of(const Gram& gram) const {
+    Eigen::VectorXd out = 1e-9 * gram.xx.diagonal().array() + 1e-30;
+    for (auto c = static_cast<Eigen::Index>(design_.nuisance.size()); c < out.size(); ++c)
+      out[c] = std::pow(0.05 * design_.prior[columns_[static_cast<std::size_t>(c)]], -2.0);
+    return out;
+  }
+
+  static Eigen::MatrixXd with_diagonal(Eigen::MatrixXd xx, const Eigen::VectorXd& more) {
+    xx.diagonal() += more;
     return xx;
   }
 
@@ -229,47 +268,26 @@ class FlexibleFit {
     return out;
   }
 
-  /// As long as all weights are equal, the sums only change their scale.
-  void sum(const Eigen::VectorXd& weight, double uniform) {
-    if (uniform > 0.0 && summed_at_ > 0.0) {
-      const double times = std::pow(summed_at_ / uniform, 2.0);
-      for (Eigen::MatrixXd& part : xx_) part *= times;
-      xy_ *= times;
-    } else {
-      xx_.clear();
-      xy_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns_.size()));
-      for (const int kind : kinds_) {
-        Gram sums = sum_of(design_, weight, columns_, [kind](std::int32_t, int other) { return other == kind; });
-        xx_.push_back(std::move(sums.xx));
-        xy_ += sums.xy;
-      }
-    }
-    summed_at_ = uniform;
-  }
-
   const Design& design_;
   const std::vector<int> columns_;
-  std::vector<int> kinds_;           // that there are values of
-  std::vector<Eigen::MatrixXd> xx_;  // of each of these kinds
-  Eigen::VectorXd xy_, residual_;
+  int threads_;
+  std::vector<int> kinds_;   // that there are values of
+  std::vector<Gram> parts_;  // of each of these kinds, kParts one after the other
+  Eigen::VectorXd residual_;
   ByKind used_{};
   double summed_at_ = 0.0;  // noise that the sums were weighted with
 };
 
 }  // namespace
 
-/// By how much less than everything at once the best of some models misses poses that it did not see, by kind of value:
-/// few poses are predicted worse by a fit of everything than by frames alone, or links as well.
-static ByKind less_than_everything(const FlexibleFit& everything, const std::vector<FlexibleFit>& others,
-                                   const std::vector<Block>& blocks, const Eigen::VectorXd& own,
-                                   const Eigen::VectorXd& weight) {
-  const auto misses = [&](const FlexibleFit& model) {
-    return sigma_of(blocks, own.cwiseProduct(model.predicted_residual(weight)), {});
-  };
-  const ByKind all = misses(everything);
+/// By how much less than everything at once, which misses `all`, the best of some models misses poses that it did not
+/// see, by kind of value: few poses are predicted worse by a fit of everything than by frames alone, or links as well.
+static ByKind less_than_everything(const ByKind& all, std::vector<FlexibleFit> others, const std::vector<Block>& blocks,
+                                   const Eigen::VectorXd& own, const Eigen::VectorXd& weight) {
   ByKind out = {1.0, 1.0, 1.0};
-  for (const FlexibleFit& model : others) {
-    const ByKind sigma = misses(model);
+  for (FlexibleFit& model : others) {
+    model.sum(weight, 0.0);
+    const ByKind sigma = sigma_of(blocks, own.cwiseProduct(model.predicted_residual()), {});
     for (std::size_t kind = 0; kind < out.size(); ++kind)
       if (all[kind] > 0.0) out[kind] = std::min(out[kind], sigma[kind] / all[kind]);
   }
@@ -311,14 +329,15 @@ static double design_effect_of(const Design& design, const Eigen::VectorXd& weig
   return 1.0 + (squares_of_counts / values - 1.0) * correlation;
 }
 
-Weighted weigh(const Design& design, const Measurements& data) {
+Weighted weigh(const Design& design, const Measurements& data, int threads) {
   constexpr int kFits = 3;               // fits
   constexpr double kSaturated = 0.5;     // of the training values, that the fit's effective parameters are
   constexpr double kCountsLittle = 0.2;  // root of the weight of a row that is said to be an outlier
   const std::vector<Block> blocks = blocks_of(design);
   const Eigen::VectorXd own = own_weights(design, data);
-  FlexibleFit flexible(design, flexible_columns(design));
-  const std::vector<FlexibleFit> plainer = {{design, design.nuisance}, {design, columns_of_links(design)}};
+  FlexibleFit flexible(design, flexible_columns(design), threads);
+  const std::vector<FlexibleFit> plainer = {{design, design.nuisance, threads},
+                                            {design, columns_of_links(design), threads}};
   const auto values =
       std::count_if(design.fold.begin(), design.fold.end(), [&](std::int32_t fold) { return fold < design.folds; });
   Weighted out;
@@ -327,15 +346,14 @@ Weighted weigh(const Design& design, const Measurements& data) {
     // A fit that passes through most of what it saw says nothing of noise: then what it predicts of other poses counts.
     const ByKind& fitted = flexible.used();
     const bool predicts = fitted[0] + fitted[1] + fitted[2] > kSaturated * static_cast<double>(values);
-    const Eigen::VectorXd residual = predicts ? flexible.predicted_residual(out.weight) : flexible.residual();
+    const Eigen::VectorXd residual = predicts ? flexible.predicted_residual() : flexible.residual();
     const ByKind used = predicts ? ByKind{} : fitted;
     const ByKind sigma = sigma_of(blocks, own.cwiseProduct(residual), used);
     const ByKind predicted = predicts ? sigma : sigma_of_predictions(blocks, own.cwiseProduct(residual), sigma);
     const std::vector<double> squares = standardised_squares(blocks, own, residual, sigma, predicted);
     const bool tails = round > 0 && has_tails(blocks, standardised_squares(blocks, own, residual, sigma, sigma));
     const bool bounded = predicts && round == kFits;
-    const ByKind less =
-        bounded ? less_than_everything(flexible, plainer, blocks, own, out.weight) : ByKind{1.0, 1.0, 1.0};
+    const ByKind less = bounded ? less_than_everything(sigma, plainer, blocks, own, out.weight) : ByKind{1.0, 1.0, 1.0};
     ByKind noise{};
     for (std::size_t kind = 0; kind < noise.size(); ++kind) noise[kind] = less[kind] * sigma[kind];
     for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -351,10 +369,11 @@ Weighted weigh(const Design& design, const Measurements& data) {
     out.noise.position_sigma = in_metres[0] > 0.0 ? less[0] * in_metres[0] : less[2] * in_metres[2];
     if (round == kFits) break;
     const auto kinds = std::count_if(sigma.begin(), sigma.end(), [](double one) { return one > 0.0; });
-    flexible.fit(out.weight, kinds == 1 && !tails ? *std::max_element(noise.begin(), noise.end()) : 0.0);
+    flexible.sum(out.weight, kinds == 1 && !tails ? *std::max_element(noise.begin(), noise.end()) : 0.0);
+    flexible.fit();
   }
   if (has_repeats(design))
-    out.noise.design_effect = design_effect_of(design, out.weight, flexible.predicted_residual(out.weight));
+    out.noise.design_effect = design_effect_of(design, out.weight, flexible.predicted_residual());
   return out;
 }
 
@@ -388,19 +407,13 @@ double noise_of_positions(const Work& work, const Evidence::State& state) {
 Grams make_grams(const Design& design, double design_effect, int threads) {
   const int folds = design.folds + design.test_folds;
   std::vector<Gram> grams(static_cast<std::size_t>(folds));
-  const auto some = [&](int first) {
+  constexpr std::size_t kTogether = 2;  // threads at most, for the sums of each take memory
+  const auto some = [&](std::size_t first) {
     GramSum sum(design.x.cols());
-    for (int f = first; f < folds; f += 2)
+    for (auto f = static_cast<int>(first); f < folds; f += kTogether)
       grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f, &sum), 1.0 / design_effect);
   };
-  if (threads == 1) {
-    some(0);
-    some(1);
-  } else {
-    std::thread other(some, 1);
-    some(0);
-    other.join();
-  }
+  for_each_on_threads(kTogether, threads, {}, some, 1);
   Grams out;
   out.train_folds.assign(std::make_move_iterator(grams.begin()), std::make_move_iterator(grams.begin() + design.folds));
   out.test_folds.assign(std::make_move_iterator(grams.begin() + design.folds), std::make_move_iterator(grams.end()));

@@ -81,10 +81,13 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
       d.topLeftCorner(nuisance, nuisance) + (1e-10 * d.diagonal().head(nuisance)).asDiagonal().toDenseMatrix();
   const double before =
       gram.yy - gram.xy.head(nuisance).dot(solve_symmetric<Eigen::Dynamic, 1>(base, gram.xy.head(nuisance)));
-  for (Eigen::Index k = 0; k < p; ++k) d(k, k) += 1e-10 * gram.xx(k, k) + (k < nuisance ? 0.0 : 1.0 / (1e-3 * 1e-3));
+  Eigen::VectorXd precision = 1e-10 * d.diagonal();
+  precision.tail(p - nuisance).array() += 1.0 / (1e-3 * 1e-3);
+  d.diagonal() += precision;
   const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(d));
   const double after = gram.yy - gram.xy.dot(factor.solve(gram.xy));
-  const double used = trace_of_product(upper_inverse(factor), gram.xx) - static_cast<double>(nuisance);
+  // The trace of A^-1 (A - P) with a diagonal P.
+  const double used = static_cast<double>(p - nuisance) - precision.dot(diagonal_of_inverse(factor));
   const double noise = after / std::max(1.0, gram.n - static_cast<double>(nuisance) - used);
   *closable = std::max(before - noise * std::max(1.0, gram.n - static_cast<double>(nuisance)), 1e-300);
   return std::max(0.0, before - after - used * noise);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "kernel/kernel.hpp"
+#include "math/batch.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 
@@ -109,6 +110,13 @@ void Gram::add(const Gram& other, double times) {
   n += times * other.n;
 }
 
+void Gram::scale(double times) {
+  xx *= times;
+  xy *= times;
+  yy *= times;
+  n *= times;
+}
+
 Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d) {
   Eigen::LLT<Eigen::MatrixXd> factor(d);
   for (double more = 1e-10; factor.info() != Eigen::Success && more < 1.0; more *= 100.0) {
@@ -119,19 +127,49 @@ Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d) {
   return factor;
 }
 
-// A^-1 = L^-T L^-1, by blocks of columns of L^-1, which are zero above the diagonal.
-Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor) {
-  constexpr Eigen::Index kBlock = 64;
-  const Eigen::MatrixXd& L = factor.matrixLLT();
+namespace {
+
+/// So many columns of L^-1 at a time.
+constexpr Eigen::Index kInverseBlock = 64;
+
+/// Calls work(first, count) for blocks of columns.
+template <typename Work>
+void for_inverse_blocks(Eigen::Index n, int threads, const Work& work) {
+  const auto one = [&](std::size_t block) {
+    const Eigen::Index first = static_cast<Eigen::Index>(block) * kInverseBlock;
+    work(first, std::min(kInverseBlock, n - first));
+  };
+  for_each_on_threads(static_cast<std::size_t>((n + kInverseBlock - 1) / kInverseBlock), threads, {}, one, 1);
+}
+
+/// L^-1, by blocks of columns, which are zero above the diagonal.
+Eigen::MatrixXd inverse_of_lower(const Eigen::MatrixXd& L, int threads) {
   const Eigen::Index n = L.rows();
-  Eigen::MatrixXd half = Eigen::MatrixXd::Identity(n, n), out(n, n);
-  for (Eigen::Index first = 0; first < n; first += kBlock) {
-    const Eigen::Index below = n - first, count = std::min(kBlock, below), last = first + count;
-    auto columns = half.block(first, first, below, count);
-    L.bottomRightCorner(below, below).triangularView<Eigen::Lower>().solveInPlace(columns);
-    out.block(0, first, last, count).noalias() = half.block(first, 0, below, last).transpose() * columns;
-  }
+  Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n, n);
+  for_inverse_blocks(n, threads, [&](Eigen::Index first, Eigen::Index count) {
+    auto columns = out.block(first, first, n - first, count);
+    L.bottomRightCorner(n - first, n - first).triangularView<Eigen::Lower>().solveInPlace(columns);
+  });
   return out;
+}
+
+}  // namespace
+
+// A^-1 = L^-T L^-1.
+Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor, int threads) {
+  const Eigen::MatrixXd half = inverse_of_lower(factor.matrixLLT(), threads);
+  const Eigen::Index n = half.rows();
+  Eigen::MatrixXd out(n, n);
+  for_inverse_blocks(n, threads, [&](Eigen::Index first, Eigen::Index count) {
+    const Eigen::Index below = n - first, last = first + count;
+    out.block(0, first, last, count).noalias() =
+        half.block(first, 0, below, last).transpose() * half.block(first, first, below, count);
+  });
+  return out;
+}
+
+Eigen::VectorXd diagonal_of_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor, int threads) {
+  return inverse_of_lower(factor.matrixLLT(), threads).colwise().squaredNorm().transpose();
 }
 
 double trace_of_product(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& whole) {
@@ -157,6 +195,10 @@ static Eigen::MatrixXd whole_of_upper(const Upper& upper, Eigen::Index n) {
   }
   return out;
 }
+
+GramSum::GramSum(Eigen::Index columns)
+    : columns_(columns),
+      rows_(Rows::Zero(kLength, (columns + kernel::kRowColumns) / kernel::kRowColumns * kernel::kRowColumns)) {}
 
 void GramSum::push() {
   n_ += 1.0;
@@ -194,10 +236,6 @@ Evidence::Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std
                    const Eigen::VectorXd& prior, Nuisance treated)
     : gram_(gram), groups_(groups), nuisance_(std::move(nuisance)), prior_(prior) {
   degrees_of_freedom_ = std::max(1.0, gram.n - static_cast<double>(nuisance_.size()));
-GramSum::GramSum(Eigen::Index columns)
-    : columns_(columns),
-      rows_(Rows::Zero(kLength, (columns + kernel::kRowColumns) / kernel::kRowColumns * kernel::kRowColumns)) {}
-
   if (treated == Nuisance::in_factor || nuisance_.empty()) return;
   eliminated_ = nuisance_.size();
   Eigen::MatrixXd d = block(gram.xx, nuisance_, nuisance_);

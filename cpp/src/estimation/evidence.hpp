@@ -25,6 +25,7 @@ struct Gram {
   double n = 0.0;
 
   void add(const Gram& other, double times = 1.0);
+  void scale(double times);
   Gram of(const std::vector<int>& columns) const;
 };
 
@@ -32,7 +33,9 @@ struct Gram {
 Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d);
 
 /// The upper triangle of A^-1, for A = L L^T.
-Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor);
+Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor, int threads = 1);
+/// Its diagonal alone, which is quicker.
+Eigen::VectorXd diagonal_of_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor, int threads = 1);
 /// Trace of the product of two symmetric matrices, of one of which only the upper triangle is given.
 double trace_of_product(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& whole);
 
@@ -50,10 +53,10 @@ class GramSum {
   static constexpr Eigen::Index kLength = 256;
   void fold_in();
 
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Eigen::Index columns_;
   Eigen::Index filled_ = 0;
   double n_ = 0.0;
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Rows rows_;  ///< shape (kLength, columns + 1 and what the kernel needs more)
   Rows sums_;  ///< upper triangle of the products of these columns, once something was folded in
 };

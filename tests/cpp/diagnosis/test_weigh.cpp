@@ -51,7 +51,7 @@ struct Weighed {
 
 TEST_CASE("noise is found, and weights are its inverse") {
   const Weighed scene(400, 1, 2e-4, 0.0);
-  const Weighted weighted = weigh(scene.design, scene.data);
+  const Weighted weighted = weigh(scene.design, scene.data, 1);
   CHECK(weighted.noise.position_sigma == doctest::Approx(2e-4).scale(0).epsilon(0.06));
   CHECK(weighted.noise.design_effect == doctest::Approx(1.0));  // nothing is repeated
   CHECK(weighted.noise.outliers.empty());
@@ -82,7 +82,7 @@ TEST_CASE("rows held out do not stand far out because a flexible fit did not see
   // 240 poses of 3 values each, and 340 free columns: of other poses they leave twice the square of the noise.
   const Weighed few(360, 1, 2e-4, 0.0);
   const Design design = with_chance(few.design, 340);
-  const Weighted weighted = weigh(design, few.data);
+  const Weighted weighted = weigh(design, few.data, 1);
   CHECK(weighted.noise.outliers.empty());
   int less = 0;  // of 120 rows held out, one in 34 beyond three standard deviations
   for (Eigen::Index i = 0; i < design.x.rows(); i += 3) {
@@ -95,14 +95,14 @@ TEST_CASE("rows held out do not stand far out because a flexible fit did not see
 TEST_CASE("what a fit of everything predicts badly of few poses is not their noise") {
   // 120 poses of 3 values each, and as many free columns: frames alone predict other poses better.
   const Weighed few(180, 1, 2e-4, 0.0);
-  CHECK(weigh(with_chance(few.design, 360), few.data).noise.position_sigma ==
+  CHECK(weigh(with_chance(few.design, 360), few.data, 1).noise.position_sigma ==
         doctest::Approx(2e-4).scale(0).epsilon(0.12));
 }
 
 TEST_CASE("a row far out counts for nothing, and is named") {
   Weighed scene(400, 1, 2e-4, 0.0);
   scene.design.y[3 * 70 + 1] += 0.05;
-  const Weighted weighted = weigh(scene.design, scene.data);
+  const Weighted weighted = weigh(scene.design, scene.data, 1);
   CHECK(weighted.noise.outliers == std::vector<std::int32_t>{70});
   CHECK(weighted.weight[3 * 70] < 0.01 * weighted.weight[0]);
 }
@@ -111,7 +111,7 @@ TEST_CASE("rows of a pose that err together count by the design effect 1 + (m - 
   for (const double rho : {0.0, 0.5, 0.9}) {
     CAPTURE(rho);
     const Weighed scene(600, 4, 2e-4 * std::sqrt(1.0 - rho), 2e-4 * std::sqrt(rho));
-    CHECK(weigh(scene.design, scene.data).noise.design_effect ==
+    CHECK(weigh(scene.design, scene.data, 1).noise.design_effect ==
           doctest::Approx(1.0 + 3.0 * rho).scale(0).epsilon(0.08));
   }
 }
@@ -134,13 +134,13 @@ TEST_CASE("a fit that passes through all poses does not hide what their repeats 
   design.candidates.groups.resize(1);
   design.candidates.named.resize(1);
   for (int c = 4; c < 100; ++c) design.candidates.groups[0].columns.push_back(c);
-  CHECK(weigh(design, small.data).noise.design_effect > 2.5);
+  CHECK(weigh(design, small.data, 1).noise.design_effect > 2.5);
 }
 
 TEST_CASE("sums of appended columns are those of all columns made afresh") {
   Weighed scene(60, 2, 2e-4, 1e-4);
   Design& design = scene.design;
-  design.weight = weigh(design, scene.data).weight;
+  design.weight = weigh(design, scene.data, 1).weight;
   const Design::Rows all = design.x;
   design.x = all.leftCols(2);
   Grams grown = make_grams(design, 1.7, 1);

@@ -98,6 +98,24 @@ TEST_CASE("sums of rows equal the dense product, whatever the number of columns 
   }
 }
 
+TEST_CASE("the inverse of a factored matrix, and its diagonal, on one thread and on two") {
+  for (const Eigen::Index n : {1, 63, 64, 130}) {
+    CAPTURE(n);
+    const Eigen::MatrixXd x = random_matrix(n + 20, n, 7);
+    const Eigen::MatrixXd a = x.transpose() * x;
+    const Eigen::LLT<Eigen::MatrixXd> factor(a);
+    const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n, n)), upper = upper_inverse(factor);
+    const Eigen::VectorXd diagonal = diagonal_of_inverse(factor);
+    const double scale = inverse.cwiseAbs().maxCoeff();
+    CHECK((upper - inverse).triangularView<Eigen::Upper>().toDenseMatrix().cwiseAbs().maxCoeff() <= 1e-11 * scale);
+    CHECK((diagonal - inverse.diagonal()).cwiseAbs().maxCoeff() <= 1e-11 * scale);
+    CHECK(diagonal_of_inverse(factor, 2) == diagonal);
+    CHECK(upper_inverse(factor, 2).triangularView<Eigen::Upper>().toDenseMatrix() ==
+          upper.triangularView<Eigen::Upper>().toDenseMatrix());
+    CHECK(trace_of_product(upper, a) == doctest::Approx(static_cast<double>(n)).epsilon(1e-10));
+  }
+}
+
 TEST_CASE("Gram matrices add up, and leave out columns") {
   const Eigen::MatrixXd x = random_matrix(40, 5, 1);
   const Eigen::VectorXd y = random_matrix(40, 1, 2);
