@@ -478,7 +478,7 @@ static void find_gap(const Work& work, Gears* gears, Decision* out) {
   for (const int g : list.which) best = std::max(best, out->first[static_cast<std::size_t>(g)].score);
   const Gram gram = work.grams.train.of(list.columns);
   const Evidence few(gram, list.groups, list.nuisance, list.prior);
-  std::vector<double> null = few.null_scores(few.evaluate({}), kNullDraws, options.seed + 11);
+  std::vector<double> null = few.null_scores(few.evaluate({}), kNullDraws, options.seed + 11, options.threads);
   int above = 1;
   for (const double score : null) above += score >= best ? 1 : 0;
   out->p_gap = static_cast<double>(above) / (static_cast<double>(null.size()) + 1.0);

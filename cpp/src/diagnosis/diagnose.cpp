@@ -565,7 +565,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   decide_on_robot(whole.frames.robot, fitted, &result);
   result.candidates = list_candidates(work, evidence, decision.first);
   result.detectable = smallest_sizes(work, evidence, decision);
-  share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, &result);
+  share_out(work.design, work.inputs, robot, work.noise.design_effect, options.seed + 17, options.threads, &result);
   map_workspace(whole.frames.robot, whole.data, result.residuals_before, &result);
   result.neighbour_share = neighbour_share(whole.data, result.set, fitted.after_all, &result.neighbour_p95);
 

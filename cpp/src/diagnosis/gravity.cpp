@@ -16,6 +16,7 @@
 
 #include <Eigen/Geometry>
 
+#include "math/batch.hpp"
 #include "math/constants.hpp"
 #include "model/gravity.hpp"
 #include "model/motion.hpp"
@@ -252,10 +253,11 @@ const Vector3d& nearest(const std::vector<Vector3d>& to, const Vector3d& directi
 
 /// The direction under which springs explain most; a coarse one that is as near as the scan can tell. A direction and
 /// its opposite explain the same, by springs of the other sign.
-Vector3d best_direction(const Springs& springs) {
+Vector3d best_direction(const Springs& springs, int threads) {
   const auto best_of = [&](const std::vector<Vector3d>& directions) {
-    std::vector<double> evidence;
-    for (const Vector3d& direction : directions) evidence.push_back(springs.evidence(direction));
+    std::vector<double> evidence(directions.size());
+    const auto work = [&](std::size_t k) { evidence[k] = springs.evidence(directions[k]); };
+    for_each_on_threads(directions.size(), threads, {}, work, 1);
     const auto best = std::max_element(evidence.begin(), evidence.end());
     return std::make_pair(*best, directions[static_cast<std::size_t>(best - evidence.begin())]);
   };
@@ -286,7 +288,7 @@ std::optional<Vector3d> other_gravity(const Work& work) {
   const Vector3d written = springs.as_written();
   const Eigen::VectorXd as_it_is = springs.significance(written);
   if (are_springs(-as_it_is)) return -work.given.frames.robot.gravity;  // it hangs upside down
-  Vector3d down = best_direction(springs);
+  Vector3d down = best_direction(springs, work.given.options.threads);
   if (are_springs(springs.significance(-down))) down = -down;
   const bool other = down.dot(written) < std::cos(kAsNear) && are_springs(springs.significance(down)) &&
                      springs.evidence(down) > springs.evidence(written) + kNatsWon;

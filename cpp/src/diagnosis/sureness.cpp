@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "diagnosis/free_search.hpp"
+#include "math/batch.hpp"
 #include "math/random.hpp"
 #include "model/effects/traits.hpp"
 
@@ -426,13 +427,14 @@ static std::vector<std::vector<int>> select_again(const Work& work, const Decisi
   quick.beam = 1;
   const Shortlist list = shortlist(work, decision.state.choice.groups);
   const std::vector<Gram> folds = of_columns(work.grams.train_folds, list.columns);
-  std::vector<std::vector<int>> chosen;
-  for (int r = 0; r < std::min(kSelections, work.given.options.resamples); ++r) {
-    const Gram train = drawn(folds, random);
-    chosen.emplace_back();
-    for (const int g : Evidence(train, list.groups, list.nuisance, list.prior).search(quick).choice.groups)
-      chosen.back().push_back(list.which[static_cast<std::size_t>(g)]);
-  }
+  std::vector<Gram> draws;
+  for (int r = 0; r < std::min(kSelections, work.given.options.resamples); ++r) draws.push_back(drawn(folds, random));
+  std::vector<std::vector<int>> chosen(draws.size());
+  const auto select = [&](std::size_t r) {
+    for (const int g : Evidence(draws[r], list.groups, list.nuisance, list.prior).search(quick).choice.groups)
+      chosen[r].push_back(list.which[static_cast<std::size_t>(g)]);
+  };
+  for_each_on_threads(draws.size(), work.given.options.threads, {}, select, 1);
   return chosen;
 }
 

@@ -9,6 +9,7 @@
 
 #include "diagnosis/free_search.hpp"
 #include "estimation/evidence.hpp"
+#include "math/batch.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/random.hpp"
 #include "math/statistics.hpp"
@@ -16,7 +17,7 @@
 namespace truing::diagnosis {
 namespace {
 
-constexpr int kResamples = 24;
+constexpr std::size_t kResamples = 24;
 constexpr std::size_t kMostValues = 6000;
 
 /// Gram of the nuisance columns and some free functions, of the rows `at` that are in a fold; -1: in any.
@@ -94,7 +95,7 @@ double explained(const Gram& gram, Eigen::Index nuisance, double* closable) {
 }
 
 Share share_of(const Design& design, const Design::Rows& more, const std::vector<Eigen::Index>& at,
-               double design_effect, double closable, std::uint64_t seed) {
+               double design_effect, double closable, std::uint64_t seed, int threads) {
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
   GramSum sum(nuisance + more.cols());
   std::vector<Gram> folds;
@@ -105,17 +106,20 @@ Share share_of(const Design& design, const Design::Rows& more, const std::vector
   double own = 0.0;
   Share out;
   out.value = explained(all, nuisance, &own) / closable;
-  std::vector<double> values;
   Random random(seed);
-  for (int r = 0; r < kResamples; ++r) {
-    std::vector<double> times(folds.size(), 0.0);
-    for (std::size_t k = 0; k < folds.size(); ++k) times[random.below(folds.size())] += 1.0;
+  std::vector<std::vector<double>> times(kResamples, std::vector<double>(folds.size(), 0.0));
+  for (std::vector<double>& of_draw : times)
+    for (std::size_t k = 0; k < folds.size(); ++k) of_draw[random.below(folds.size())] += 1.0;
+  std::vector<double> values(times.size());
+  const auto work = [&](std::size_t r) {
     Gram drawn;
     for (std::size_t k = 0; k < folds.size(); ++k) {
-      if (times[k] > 0.0) drawn.add(folds[k], times[k]);
+      if (times[r][k] > 0.0) drawn.add(folds[k], times[r][k]);
     }
-    values.push_back(explained(drawn, nuisance, &own) / closable);
-  }
+    double closable_of_draw = 0.0;
+    values[r] = explained(drawn, nuisance, &closable_of_draw) / closable;
+  };
+  for_each_on_threads(times.size(), threads, {}, work, 1);
   out.value = std::min(1.0, out.value);
   out.low = std::clamp(std::min(out.value, quantile(&values, 0.05)), 0.0, 1.0);
   out.high = std::clamp(std::max(out.value, quantile(&values, 0.95)), 0.0, 1.0);
@@ -125,7 +129,7 @@ Share share_of(const Design& design, const Design::Rows& more, const std::vector
 }  // namespace
 
 void share_out(const Design& design, const std::vector<InputColumn>& inputs, const Robot& robot, double design_effect,
-               std::uint64_t seed, Diagnosis* out) {
+               std::uint64_t seed, int threads, Diagnosis* out) {
   constexpr std::size_t kMostMoving = 20;
   const std::vector<Eigen::Index> at = some_training_rows(design, kMostValues).at;
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
@@ -148,7 +152,7 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
   for (std::size_t joint = 0; joint < robot.joints.size(); ++joint) {
     const Design::Rows functions = functions_of(design, inputs, at, design.joint_column[joint], moving, 5);
     out->where_joints.push_back(
-        {robot.joints[joint].name, share_of(design, functions, at, design_effect, closable, seed + joint)});
+        {robot.joints[joint].name, share_of(design, functions, at, design_effect, closable, seed + joint, threads)});
   }
   for (const int input : moving) {
     const double share = explained(gram_at_every_site({input}, 5), nuisance, &own) / closable;

@@ -560,7 +560,8 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
   return improve(best, options);
 }
 
-std::vector<double> Evidence::null_scores(const State& state, int count, std::uint64_t seed) const {
+std::vector<double> Evidence::null_scores(const State& state, int count, std::uint64_t seed, int threads) const {
+  constexpr std::size_t kDrawsAtATime = 8;
   const WhiteNoise noise(gram_);
   const Projected projected = project(state);
   struct Prepared {
@@ -590,9 +591,11 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
     prepared.push_back(std::move(one));
   }
   Random random(seed);
-  std::vector<double> out;
-  for (int k = 0; k < count; ++k) {
-    auto [xy, yy] = noise.draw(&random);
+  std::vector<WhiteNoise::Draw> draws;
+  for (int k = 0; k < count; ++k) draws.push_back(noise.draw(&random));
+  std::vector<double> out(draws.size(), -1e300);
+  const auto score = [&](std::size_t k) {
+    auto& [xy, yy] = draws[k];
     xy *= std::sqrt(state.sigma2);
     yy *= state.sigma2;
     if (eliminated_ > 0) {
@@ -602,17 +605,16 @@ std::vector<double> Evidence::null_scores(const State& state, int count, std::ui
     }
     const Eigen::VectorXd u = state.factor.matrixL().solve(part(xy, factored(state)));
     const double rss = std::max(yy - u.squaredNorm(), 1e-300);
-    double largest = -1e300;
     for (const Prepared& one : prepared) {
       const Eigen::VectorXd b = part(xy, one.group->columns) - one.v.transpose() * u;
       for (std::size_t s = 0; s < one.factor.size(); ++s) {
         const double fall = std::min(one.factor[s].matrixL().solve(b).squaredNorm(), (1.0 - 1e-9) * rss);
-        largest = std::max(largest, -0.5 * degrees_of_freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] -
-                                        one.group->cost);
+        out[k] = std::max(
+            out[k], -0.5 * degrees_of_freedom_ * std::log1p(-fall / rss) + 0.5 * one.determinants[s] - one.group->cost);
       }
     }
-    out.push_back(largest);
-  }
+  };
+  for_each_on_threads(draws.size(), threads, {}, score, kDrawsAtATime);
   return out;
 }
 

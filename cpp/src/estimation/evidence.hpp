@@ -152,7 +152,7 @@ class Evidence {
   State improve(State state, const SearchOptions& options) const;
 
   /// Noise-only data: the largest score of any single group, `count` times.
-  std::vector<double> null_scores(const State& state, int count, std::uint64_t seed) const;
+  std::vector<double> null_scores(const State& state, int count, std::uint64_t seed, int threads) const;
 
   const Gram& gram() const { return gram_; }
   const std::vector<ColumnGroup>& groups() const { return groups_; }

@@ -246,8 +246,8 @@ TEST_CASE("one draw of noise in a hundred scores above the 99 % quantile of the 
     const Eigen::VectorXd first = problem.noise(0.1, 72);
     const Gram gram = gram_of(problem.x, first);
     const Evidence evidence(gram, problem.groups, problem.nuisance, problem.prior);
-    std::vector<double> null = evidence.null_scores(evidence.evaluate({}), 2000, 73);
-    CHECK(null == evidence.null_scores(evidence.evaluate({}), 2000, 73));
+    std::vector<double> null = evidence.null_scores(evidence.evaluate({}), 2000, 73, 1);
+    CHECK(null == evidence.null_scores(evidence.evaluate({}), 2000, 73, 2));
     std::sort(null.begin(), null.end());
     const double bound = null[1980];
     int above = 0;
@@ -315,6 +315,7 @@ TEST_CASE("what is always in may be eliminated once: every answer stays") {
     CHECK(close(whole.visible(a, 7), rest.visible(b, 7)));
     CHECK(close(whole.explained(a, {5}, Eigen::VectorXd::Ones(1), {7, 8}),
                 rest.explained(b, {5}, Eigen::VectorXd::Ones(1), {7, 8})));
-    CHECK(whole.null_scores(a, 5, 103).back() == doctest::Approx(rest.null_scores(b, 5, 103).back()).epsilon(1e-9));
+    CHECK(whole.null_scores(a, 5, 103, 1).back() ==
+          doctest::Approx(rest.null_scores(b, 5, 103, 1).back()).epsilon(1e-9));
   }
 }
