@@ -1,11 +1,15 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
 
-// Names that together stand for one function: laws of one joint's angle, a frame that wanders, or parts that give way
-// under weight, which one function of what they depend on explains as well. Taken one by one each of them holds, for
-// the others make up for what it lacks.
+// Names that together stand for one function: laws of one angle, or of several at one joint, a frame that wanders, or
+// parts that give way under weight, which one function of what they depend on explains as well. Taken one by one each
+// of them holds, for the others make up for what it lacks.
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+#include <string>
 
 #include "diagnosis/diagnosis.hpp"
 #include "diagnosis/free_search.hpp"
@@ -27,29 +31,82 @@ struct Bundle {
   std::vector<int> groups;
   std::vector<int> inputs;
   std::size_t names = 0;  ///< of `groups`, without what corrects them
-  int joint = -1;         ///< where all of them act; -1: at no one joint
+  int joint = -1;         ///< whose angle it is, or where all of them act; -1: no one joint's
+  bool of_two = false;    ///< in their place functions of one or two of the inputs are tried, at this joint only
 };
 
-/// Laws of one joint's own angle, with what corrects them. A single one is held against functions where its confidence
-/// is found.
+bool are_among(const std::vector<int>& some, const std::vector<int>& all) {
+  return std::all_of(some.begin(), some.end(),
+                     [&](int one) { return std::find(all.begin(), all.end(), one) != all.end(); });
+}
+
+/// A law that depends on this angle alone.
+bool is_of_angle(const Work& work, const Explanation& e, int angle) {
+  const std::vector<MovedBy> motions = motions_of_law(work, e);
+  return !motions.empty() &&
+         std::all_of(motions.begin(), motions.end(), [&](const MovedBy& motion) { return motion.angle == angle; });
+}
+
+/// The joints that chosen laws of an angle move: its own, and those that it carries along.
+std::set<std::string> moved_with(const Work& work, const Choice& choice, int angle) {
+  std::set<std::string> out;
+  for (const int g : choice.groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    if (is_of_angle(work, e, angle)) out.insert(e.joints[0]);
+  }
+  return out;
+}
+
+/// Laws of one joint's angle, with what corrects them: its own, and those of joints that it carries along, with their
+/// zeros. A single one is held against functions where its confidence is found.
 Bundle laws_of_angle(const Work& work, const Choice& choice, std::size_t joint) {
   Bundle out;
   const int angle = input_named(work, input_name(Driver::angle, joint));
   if (angle < 0) return out;
-  const std::string& name = work.given.frames.robot.joints[joint].name;
+  const std::set<std::string> moved = moved_with(work, choice, angle);
   for (const int g : choice.groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     if (e.kind == Kind::law || e.kind == Kind::free) {
-      if (e.site == name && e.inputs == std::vector<int>{angle}) out.groups.push_back(g);
+      if (moved.count(e.site) > 0 && e.inputs == std::vector<int>{angle}) out.groups.push_back(g);
       continue;
     }
-    if (e.kind != Kind::catalogue || !has_law_at(work, e, name) || !follows_own_angle(effect_traits(work, e))) continue;
+    const bool is_zero =
+        e.kind == Kind::catalogue && effect_traits(work, e).driver == Driver::constant &&
+        std::any_of(moved.begin(), moved.end(), [&](const std::string& at) { return has_law_at(work, e, at); });
+    if (!is_zero && !is_of_angle(work, e, angle)) continue;
     out.groups.push_back(g);
     ++out.names;
   }
   if (out.names < 2) out.groups.clear();
   out.inputs = {angle};
   out.joint = static_cast<int>(joint);
+  return out;
+}
+
+/// Laws at one joint of where the arm stands, with what corrects them: of its load, and of joints that carry it along,
+/// too.
+Bundle laws_at_joint(const Work& work, const Choice& choice, std::size_t joint) {
+  Bundle out;
+  const std::vector<Joint>& joints = work.given.frames.robot.joints;
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    const int angle = input_named(work, input_name(Driver::angle, k));
+    if (angle >= 0) out.inputs.push_back(angle);
+  }
+  for (const int g : choice.groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    if (e.kind == Kind::law || e.kind == Kind::free) {
+      if (e.site == joints[joint].name && are_among(e.inputs, out.inputs)) out.groups.push_back(g);
+      continue;
+    }
+    if (e.kind != Kind::catalogue || !has_law_at(work, e, joints[joint].name)) continue;
+    const EffectTraits& traits = effect_traits(work, e);
+    if (!follows_configuration(traits) && traits.driver != Driver::other_angles) continue;
+    out.groups.push_back(g);
+    ++out.names;
+  }
+  if (out.names < 2) out.groups.clear();
+  out.joint = static_cast<int>(joint);
+  out.of_two = true;
   return out;
 }
 
@@ -88,38 +145,59 @@ Bundle laws_of_weight(const Work& work, const Choice& choice) {
   return out;
 }
 
-constexpr int kAnyFrame = -1, kAnyWeight = -2;  ///< in place of a joint
+/// Of every joint, the frame and the weights. No groups: there is nothing to question.
+using BundleOf = std::function<Bundle(const Choice&)>;
 
-/// Of a joint, of the frame, or of weights. No groups: there is nothing to question.
-Bundle bundle_at(const Work& work, const Choice& choice, int joint) {
-  if (joint == kAnyWeight) return laws_of_weight(work, choice);
-  return joint == kAnyFrame ? wandering_frame(work, choice)
-                            : laws_of_angle(work, choice, static_cast<std::size_t>(joint));
+std::vector<BundleOf> bundles_of(const Work& work) {
+  std::vector<BundleOf> out = {[&work](const Choice& choice) { return laws_of_weight(work, choice); },
+                               [&work](const Choice& choice) { return wandering_frame(work, choice); }};
+  const std::size_t joints = work.design.joint_column.size();
+  for (std::size_t k = 0; k < joints; ++k)
+    out.emplace_back([&work, k](const Choice& choice) { return laws_of_angle(work, choice, k); });
+  for (std::size_t k = 0; k < joints; ++k)
+    out.emplace_back([&work, k](const Choice& choice) { return laws_at_joint(work, choice, k); });
+  return out;
 }
 
 /// The best function in a bundle's place.
 struct InItsPlace {
   double score = -1e300;            ///< of any
   const FreeGain* taken = nullptr;  ///< the best that may be taken: what goes with time alone is what a frame does, too
-  bool as_shape = false;            ///< a plain shape is better than the function, whose knots are too few for it
+  bool as_shape = false;            ///< a plain shape, waves or more knots than the function has are better
 };
-
-InItsPlace best_in_its_place(const Work& work, const Evidence& evidence, const Evidence::State& rest,
-                             const Bundle& bundle, const FreeScan& scan) {
-  InItsPlace out;
-  for (const FreeGain& found : scan.best) {
-    out.score = std::max(out.score, found.gain.score);
-    if (!out.taken && !is_of_time(work.inputs[static_cast<std::size_t>(found.what.inputs[0])])) out.taken = &found;
-  }
-  if (bundle.joint < 0) return out;
-  const double shape = best_local_shape(work, evidence, rest, static_cast<std::size_t>(bundle.joint), bundle.inputs[0]);
-  out.as_shape = shape > out.score;
-  out.score = std::max(out.score, shape);
-  return out;
-}
 
 bool is_at(const Robot& robot, const FreeGain& found, int joint) {
   return found.what.site == robot.joints[static_cast<std::size_t>(joint)].name;
+}
+
+/// What a plain shape at the joint wins in place of laws of its angle; and, where these leave something that goes with
+/// it, what waves and more knots than a function that is scanned has do. Two laws that are both there leave nothing.
+double best_at_joint(const Work& work, const Evidence& evidence, const Evidence::State& now,
+                     const Evidence::State& rest, const Bundle& bundle, std::size_t tried, double threshold) {
+  const auto joint = static_cast<std::size_t>(bundle.joint);
+  const int angle = bundle.inputs[0];
+  const double shape = best_local_shape(work, evidence, rest, joint, angle);
+  if (best_function(work, evidence, now, joint, angle) < threshold) return shape;
+  const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, tried)));
+  return std::max(shape, best_function(work, evidence, rest, joint, angle) - cost);
+}
+
+InItsPlace best_in_its_place(const Work& work, const Evidence& evidence, const Evidence::State& now,
+                             const Evidence::State& rest, const Bundle& bundle, const FreeScan& scan,
+                             double threshold) {
+  InItsPlace out;
+  for (const FreeGain& found : scan.best) {
+    const bool is_tried = !bundle.of_two || (is_at(work.given.frames.robot, found, bundle.joint) &&
+                                             are_among(found.what.inputs, bundle.inputs));
+    if (!is_tried) continue;
+    out.score = std::max(out.score, found.gain.score);
+    if (!out.taken && !is_of_time(work.inputs[static_cast<std::size_t>(found.what.inputs[0])])) out.taken = &found;
+  }
+  if (bundle.joint < 0 || bundle.of_two) return out;
+  const double at_joint = best_at_joint(work, evidence, now, rest, bundle, scan.tried, threshold);
+  out.as_shape = at_joint > out.score;
+  out.score = std::max(out.score, at_joint);
+  return out;
 }
 
 /// The function in place of the bundle, with many knots where it is at the joint of the names. False: poses that it was
@@ -127,7 +205,8 @@ bool is_at(const Robot& robot, const FreeGain& found, int joint) {
 bool put_in_its_place(Work* work, const Robot& robot, const Evidence::State& rest, const Bundle& bundle,
                       const InItsPlace& found, std::size_t tried, Decision* decision) {
   const double before = cross_validated(*work, decision->state.choice);
-  const bool at_its_joint = bundle.joint >= 0 && (found.as_shape || is_at(robot, *found.taken, bundle.joint));
+  const bool at_its_joint =
+      bundle.joint >= 0 && !bundle.of_two && (found.as_shape || is_at(robot, *found.taken, bundle.joint));
   if (at_its_joint)
     add_fine_function(work, robot, static_cast<std::size_t>(bundle.joint), bundle.inputs);
   else
@@ -148,23 +227,25 @@ bool put_in_its_place(Work* work, const Robot& robot, const Evidence::State& res
 }  // namespace
 
 void question_bundles(Work* work, const Robot& robot, Decision* decision) {
-  for (int joint = kAnyWeight; joint < static_cast<int>(work->design.joint_column.size()); ++joint) {
-    const Bundle bundle = bundle_at(*work, decision->state.choice, joint);
+  const double threshold = decision->search.threshold;
+  for (const BundleOf& bundle_of : bundles_of(*work)) {
+    const Bundle bundle = bundle_of(decision->state.choice);
     if (bundle.groups.empty() || bundle.inputs.empty()) continue;
     const Evidence evidence = evidence_now(*work);
     const Evidence::State rest = evidence.evaluate(without_these(decision->state.choice, bundle.groups));
     const double by_names = decision->state.score - rest.score;
     FreeScanOptions options;
     options.flips = 0;
-    options.only_of = bundle.inputs;
+    if (!bundle.of_two) options.only_of = bundle.inputs;
     const FreeScan scan =
         scan_free(work->design, evidence, rest, work->inputs, robot, work->noise.design_effect, options);
-    const InItsPlace best = best_in_its_place(*work, evidence, rest, bundle, scan);
+    const InItsPlace best = best_in_its_place(*work, evidence, decision->state, rest, bundle, scan, threshold);
     const double by_function = best.as_shape ? best.score : best.taken ? best.taken->gain.score : -1e300;
     double margin = 0.0;
-    if (bundle.joint < 0) margin = decision->search.threshold;  // frames wander more often
+    if (bundle.joint < 0) margin = threshold;  // frames wander more often
     if (bundle.names >= kMany) margin = -kInQuestion;
-    const bool is_better = by_function > std::max(by_names + margin, decision->search.threshold + kForFunctions);
+    if (bundle.of_two) margin = threshold;  // a spring beside a coupling is likelier than a function of two angles
+    const bool is_better = by_function > std::max(by_names + margin, threshold + kForFunctions);
     if (is_better && put_in_its_place(work, robot, rest, bundle, best, scan.tried, decision)) continue;
     if (best.score > by_names - kInQuestion) decision->in_question.insert(bundle.groups.begin(), bundle.groups.end());
   }

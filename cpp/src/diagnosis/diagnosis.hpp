@@ -316,6 +316,14 @@ double best_function_of(const InputColumn& along, const Work& work, const Eviden
 
 bool same_name(const Explanation& a, const Explanation& b);
 bool contains(const Explanation& large, const Explanation& small);
+/// A joint, and the angle that a law moves it with.
+struct MovedBy {
+  std::size_t joint;
+  int angle;  ///< of the inputs
+};
+
+/// Of laws of a joint's own angle, and of joints that others carry along.
+std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name);
 Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::State& state, std::size_t at);
 /// Names that are what a larger law at their joint leaves of the motion, by group, and the group of that law.
 std::map<int, int> departures_from_laws(const Work& work, const Evidence& evidence, const Decision& decision);

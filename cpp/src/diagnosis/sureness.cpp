@@ -149,14 +149,7 @@ static bool is_law_in_question(const Work& work, const Evidence& evidence, const
   return false;
 }
 
-/// A joint, and the angle that a law moves it with.
-struct MovedBy {
-  std::size_t joint;
-  int angle;  ///< of the inputs
-};
-
-/// Of laws of a joint's own angle, and of joints that others carry along.
-static std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name) {
+std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name) {
   std::vector<MovedBy> out;
   const EffectTraits& traits = effect_traits(work, name);
   if (name.kind != Kind::catalogue || name.period > 0.0 || traits.stands_for == StandsFor::link_geometry) return out;

@@ -110,17 +110,43 @@ TEST_CASE("a first joint that goes with the square of a recorded temperature is 
   CHECK(d.unknown[0].inputs == std::vector<std::string>{"temp"});
 }
 
-TEST_CASE("two laws of one joint's angle that are both there keep their names") {
+namespace {
+
+/// What a robot with these effects is said to have.
+Diagnosis diagnosis_of(const std::vector<truing::AppliedEffect>& effects, unsigned seed) {
   Robot truth = arm_without_masses();
-  truth.effects = {{"harmonic", {"J3"}, {{"harmonic.J3.cos1", 4e-4}, {"harmonic.J3.sin1", 2e-4}}},
-                   {"axis_wobble", {"J3"}, {{"axis_wobble.J3.cos_x", 4e-4}, {"axis_wobble.J3.sin_y", 4e-4}}}};
-  auto table = random_joints(truth, 200, 50);
-  measure(table.get(), truth, What::position, kTipNoise, 51);
-  const Diagnosis d = diagnose(arm_without_masses(), table->data);
+  truth.effects = effects;
+  auto table = random_joints(truth, 200, seed);
+  measure(table.get(), truth, What::position, kTipNoise, seed + 1);
+  return diagnose(arm_without_masses(), table->data);
+}
+
+bool names(const Diagnosis& d, const std::string& effect, const std::string& joint) {
+  return std::any_of(d.effects.begin(), d.effects.end(),
+                     [&](const auto& e) { return e.effect == effect && e.joints == std::vector<std::string>{joint}; });
+}
+
+}  // namespace
+
+TEST_CASE("two laws of one joint's angle that are both there keep their names") {
+  const Diagnosis d =
+      diagnosis_of({{"harmonic", {"J3"}, {{"harmonic.J3.cos1", 4e-4}, {"harmonic.J3.sin1", 2e-4}}},
+                    {"axis_wobble", {"J3"}, {{"axis_wobble.J3.cos_x", 4e-4}, {"axis_wobble.J3.sin_y", 4e-4}}}},
+                   50);
   INFO(what_was_said(d));
   CHECK(d.unknown.empty());
-  for (const char* name : {"harmonic", "axis_wobble"}) {
-    CHECK(std::any_of(d.effects.begin(), d.effects.end(),
-                      [&](const auto& e) { return e.effect == name && e.joints == std::vector<std::string>{"J3"}; }));
+  CHECK(names(d, "harmonic", "J3"));
+  CHECK(names(d, "axis_wobble", "J3"));
+}
+
+TEST_CASE("a joint that carries another along and errs by itself keeps both names") {
+  for (const unsigned seed : {60u, 70u}) {
+    const Diagnosis d = diagnosis_of({{"neighbour_coupling", {"J2"}, {{"neighbour_coupling.J2.J3", 2e-4}}},
+                                      {"harmonic", {"J3"}, {{"harmonic.J3.cos1", 3e-4}, {"harmonic.J3.sin1", 2e-4}}}},
+                                     seed);
+    INFO(what_was_said(d));
+    CHECK(d.unknown.empty());
+    CHECK(names(d, "neighbour_coupling", "J2"));
+    CHECK(names(d, "harmonic", "J3"));
   }
 }

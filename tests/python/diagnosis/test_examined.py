@@ -161,3 +161,23 @@ def test_what_a_law_leaves_at_its_joint_speaks_not_against_its_name(which: str, 
     assert (named.effect, list(named.joints)) == (effect, label["effects"][0]["joints"])
     assert [u.joint for u in found.unknown] == list(named.joints)
     assert named.grounds["unknown_found"] == 0.0 and named.probability > 0.9
+
+
+@pytest.mark.parametrize(
+    "which",
+    [
+        "development/unlisted/26@10022",
+        "development/unlisted/27@10022",
+        "development/unlisted/11@10032",
+        "examination/unlisted/4@42",
+    ],
+)
+def test_names_that_are_pieces_of_one_function_are_that_function(which: str) -> None:
+    """A corner: a zero of .99 and a harmonic of .98. A joint that another bends, twice: a coupling of .94 and
+    .98 with a bearing of that one. A cable over two joints: a coupling and a spring of .98, and a harmonic.
+    """
+    robot, data, label = make(which)
+    found = truing.diagnose(robot, data)
+    assert not found.effects
+    (unknown,) = found.unknown
+    assert (unknown.joint, list(unknown.inputs)) == (label["unlisted_joint"], label["unlisted_inputs"])
