@@ -150,3 +150,20 @@ TEST_CASE("a joint that carries another along and errs by itself keeps both name
     CHECK(names(d, "harmonic", "J3"));
   }
 }
+
+TEST_CASE("a joint that gives way and is carried along keeps both names") {
+  Robot robot = ur10();
+  robot.T_measurement_base = somewhere();
+  for (const unsigned seed : {80u, 90u}) {
+    Robot truth = robot;
+    truth.effects = {{"joint_compliance", {"J2"}, {{"joint_compliance.J2", 1e-6}}},
+                     {"neighbour_coupling", {"J2"}, {{"neighbour_coupling.J2.J3", 1e-4}}}};
+    auto table = random_joints(truth, 200, seed);
+    measure(table.get(), truth, What::position, kTipNoise, seed + 1);
+    const Diagnosis d = diagnose(robot, table->data);
+    INFO(what_was_said(d));
+    CHECK(d.unknown.empty());
+    CHECK(names(d, "joint_compliance", "J2"));
+    CHECK(names(d, "neighbour_coupling", "J2"));
+  }
+}
