@@ -35,6 +35,10 @@ struct Bundle {
   bool of_two = false;    ///< in their place functions of one or two of the inputs are tried, at this joint only
 };
 
+bool is_load(const Work& work, int input) {
+  return work.inputs[static_cast<std::size_t>(input)].name.rfind("torque", 0) == 0;
+}
+
 bool are_among(const std::vector<int>& some, const std::vector<int>& all) {
   return std::all_of(some.begin(), some.end(),
                      [&](int one) { return std::find(all.begin(), all.end(), one) != all.end(); });
@@ -57,54 +61,61 @@ std::set<std::string> moved_with(const Work& work, const Choice& choice, int ang
   return out;
 }
 
-/// Laws of one joint's angle, with what corrects them: its own, and those of joints that it carries along, with their
-/// zeros. A single one is held against functions where its confidence is found.
-Bundle laws_of_angle(const Work& work, const Choice& choice, std::size_t joint) {
+using Holds = std::function<bool(const Explanation&)>;
+
+/// Chosen names, and the functions that correct them or stand beside them. A single name is held against functions
+/// where its confidence is found.
+Bundle bundle_of(const Work& work, const Choice& choice, const Holds& is_name, const Holds& is_function) {
   Bundle out;
-  const int angle = input_named(work, input_name(Driver::angle, joint));
-  if (angle < 0) return out;
-  const std::set<std::string> moved = moved_with(work, choice, angle);
   for (const int g : choice.groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    if (e.kind == Kind::law || e.kind == Kind::free) {
-      if (moved.count(e.site) > 0 && e.inputs == std::vector<int>{angle}) out.groups.push_back(g);
-      continue;
-    }
-    const bool is_zero =
-        e.kind == Kind::catalogue && effect_traits(work, e).driver == Driver::constant &&
-        std::any_of(moved.begin(), moved.end(), [&](const std::string& at) { return has_law_at(work, e, at); });
-    if (!is_zero && !is_of_angle(work, e, angle)) continue;
-    out.groups.push_back(g);
-    ++out.names;
+    const bool function = e.kind == Kind::law || e.kind == Kind::free, name = e.kind == Kind::catalogue && is_name(e);
+    if (name || (function && is_function(e))) out.groups.push_back(g);
+    out.names += name;
   }
   if (out.names < 2) out.groups.clear();
+  return out;
+}
+
+/// Laws of one joint's angle: its own, and those of joints that it carries along, with their zeros.
+Bundle laws_of_angle(const Work& work, const Choice& choice, std::size_t joint) {
+  const int angle = input_named(work, input_name(Driver::angle, joint));
+  if (angle < 0) return {};
+  const std::set<std::string> moved = moved_with(work, choice, angle);
+  const auto is_zero = [&](const Explanation& e) {
+    return effect_traits(work, e).driver == Driver::constant &&
+           std::any_of(moved.begin(), moved.end(), [&](const std::string& at) { return has_law_at(work, e, at); });
+  };
+  Bundle out = bundle_of(
+      work, choice, [&](const Explanation& e) { return is_zero(e) || is_of_angle(work, e, angle); },
+      [&](const Explanation& e) { return moved.count(e.site) > 0 && e.inputs == std::vector<int>{angle}; });
   out.inputs = {angle};
   out.joint = static_cast<int>(joint);
   return out;
 }
 
-/// Laws at one joint of where the arm stands, with what corrects them: of its load, and of joints that carry it along,
-/// too.
-Bundle laws_at_joint(const Work& work, const Choice& choice, std::size_t joint) {
-  Bundle out;
-  const std::vector<Joint>& joints = work.given.frames.robot.joints;
-  for (std::size_t k = 0; k < joints.size(); ++k) {
+std::vector<int> angle_inputs(const Work& work) {
+  std::vector<int> out;
+  for (std::size_t k = 0; k < work.given.frames.robot.joints.size(); ++k) {
     const int angle = input_named(work, input_name(Driver::angle, k));
-    if (angle >= 0) out.inputs.push_back(angle);
+    if (angle >= 0) out.push_back(angle);
   }
-  for (const int g : choice.groups) {
-    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    if (e.kind == Kind::law || e.kind == Kind::free) {
-      if (e.site == joints[joint].name && are_among(e.inputs, out.inputs)) out.groups.push_back(g);
-      continue;
-    }
-    if (e.kind != Kind::catalogue || !has_law_at(work, e, joints[joint].name)) continue;
+  return out;
+}
+
+/// Laws at one joint of where the arm stands: of its load, and of joints that carry it along, too.
+Bundle laws_at_joint(const Work& work, const Choice& choice, std::size_t joint) {
+  const std::string& site = work.given.frames.robot.joints[joint].name;
+  const std::vector<int> angles = angle_inputs(work);
+  const auto is_law = [&](const Explanation& e) {
     const EffectTraits& traits = effect_traits(work, e);
-    if (!follows_configuration(traits) && traits.driver != Driver::other_angles) continue;
-    out.groups.push_back(g);
-    ++out.names;
-  }
-  if (out.names < 2) out.groups.clear();
+    return has_law_at(work, e, site) && (follows_configuration(traits) || traits.driver == Driver::other_angles);
+  };
+  const auto is_function = [&](const Explanation& e) {
+    return e.site == site && (are_among(e.inputs, angles) || (e.inputs.size() == 1 && is_load(work, e.inputs[0])));
+  };
+  Bundle out = bundle_of(work, choice, is_law, is_function);
+  out.inputs = angles;
   out.joint = static_cast<int>(joint);
   out.of_two = true;
   return out;
@@ -128,26 +139,20 @@ Bundle wandering_frame(const Work& work, const Choice& choice) {
 /// Joints and links that give way under their weights, with what corrects them: together they make much of what one
 /// place does under the payload.
 Bundle laws_of_weight(const Work& work, const Choice& choice) {
-  Bundle out;
   const int payload = input_named(work, "payload");
-  if (payload < 0 || work.inputs[static_cast<std::size_t>(payload)].constant) return out;
-  const auto is_torque = [&](int k) { return work.inputs[static_cast<std::size_t>(k)].name.rfind("torque", 0) == 0; };
-  for (const int g : choice.groups) {
-    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    const bool is_function = e.kind == Kind::law || e.kind == Kind::free;
-    if (is_function ? std::any_of(e.inputs.begin(), e.inputs.end(), is_torque)
-                    : effect_traits(work, e).driver == Driver::gravity_torque)
-      out.groups.push_back(g);
-    out.names += !is_function && effect_traits(work, e).driver == Driver::gravity_torque;
-  }
-  if (out.names < 2) out.groups.clear();
+  if (payload < 0 || work.inputs[static_cast<std::size_t>(payload)].constant) return {};
+  const auto of_load = [&](int k) { return is_load(work, k); };
+  Bundle out = bundle_of(
+      work, choice, [&](const Explanation& e) { return effect_traits(work, e).driver == Driver::gravity_torque; },
+      [&](const Explanation& e) { return std::any_of(e.inputs.begin(), e.inputs.end(), of_load); });
   out.inputs = {payload};
   return out;
 }
 
-/// Of every joint, the frame and the weights. No groups: there is nothing to question.
+/// No groups: there is nothing to question.
 using BundleOf = std::function<Bundle(const Choice&)>;
 
+/// Of the weights, the frame and every joint.
 std::vector<BundleOf> bundles_of(const Work& work) {
   std::vector<BundleOf> out = {[&work](const Choice& choice) { return laws_of_weight(work, choice); },
                                [&work](const Choice& choice) { return wandering_frame(work, choice); }};
@@ -228,8 +233,8 @@ bool put_in_its_place(Work* work, const Robot& robot, const Evidence::State& res
 
 void question_bundles(Work* work, const Robot& robot, Decision* decision) {
   const double threshold = decision->search.threshold;
-  for (const BundleOf& bundle_of : bundles_of(*work)) {
-    const Bundle bundle = bundle_of(decision->state.choice);
+  for (const BundleOf& find : bundles_of(*work)) {
+    const Bundle bundle = find(decision->state.choice);
     if (bundle.groups.empty() || bundle.inputs.empty()) continue;
     const Evidence evidence = evidence_now(*work);
     const Evidence::State rest = evidence.evaluate(without_these(decision->state.choice, bundle.groups));

@@ -121,7 +121,7 @@ Diagnosis diagnosis_of(const std::vector<truing::AppliedEffect>& effects, unsign
   return diagnose(arm_without_masses(), table->data);
 }
 
-bool names(const Diagnosis& d, const std::string& effect, const std::string& joint) {
+bool is_named_at(const Diagnosis& d, const std::string& effect, const std::string& joint) {
   return std::any_of(d.effects.begin(), d.effects.end(),
                      [&](const auto& e) { return e.effect == effect && e.joints == std::vector<std::string>{joint}; });
 }
@@ -135,8 +135,8 @@ TEST_CASE("two laws of one joint's angle that are both there keep their names") 
                    50);
   INFO(what_was_said(d));
   CHECK(d.unknown.empty());
-  CHECK(names(d, "harmonic", "J3"));
-  CHECK(names(d, "axis_wobble", "J3"));
+  CHECK(is_named_at(d, "harmonic", "J3"));
+  CHECK(is_named_at(d, "axis_wobble", "J3"));
 }
 
 TEST_CASE("a joint that carries another along and errs by itself keeps both names") {
@@ -146,8 +146,8 @@ TEST_CASE("a joint that carries another along and errs by itself keeps both name
                                      seed);
     INFO(what_was_said(d));
     CHECK(d.unknown.empty());
-    CHECK(names(d, "neighbour_coupling", "J2"));
-    CHECK(names(d, "harmonic", "J3"));
+    CHECK(is_named_at(d, "neighbour_coupling", "J2"));
+    CHECK(is_named_at(d, "harmonic", "J3"));
   }
 }
 
@@ -163,7 +163,7 @@ TEST_CASE("a joint that gives way and is carried along keeps both names") {
     const Diagnosis d = diagnose(robot, table->data);
     INFO(what_was_said(d));
     CHECK(d.unknown.empty());
-    CHECK(names(d, "joint_compliance", "J2"));
-    CHECK(names(d, "neighbour_coupling", "J2"));
+    CHECK(is_named_at(d, "joint_compliance", "J2"));
+    CHECK(is_named_at(d, "neighbour_coupling", "J2"));
   }
 }
