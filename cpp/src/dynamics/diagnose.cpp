@@ -168,6 +168,44 @@ bool as_good_as_free(const Account& given, const Account& free) {
   return as_good(simple, flexible) || (nearly && adds_bodies_alone(given, free));
 }
 
+/// Squares of every fold by the fit to the others, of bodies that there can be.
+VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
+  const Evidence::State& state = account.search->state(account.choice);
+  const std::vector<FoldGram>& folds = account.sums->folds;
+  VectorXd out(static_cast<Eigen::Index>(folds.size()));
+  std::vector<std::string> said_later;
+  for (std::size_t f = 0; f < folds.size(); ++f) {
+    const Gram held = folds[f].of(state.columns);
+    Sums others{{}, account.sums->all, account.sums->precision};
+    others.all.xx(state.columns, state.columns) -= held.xx;
+    others.all.xy(state.columns) -= held.xy;
+    const Fit fit = with_bodies(problem.robot, *account.design, others, fit_of(others, state.columns, state.precision),
+                                &said_later);
+    out[static_cast<Eigen::Index>(f)] = held.yy - 2.0 * fit.values.dot(held.xy) + fit.values.dot(held.xx * fit.values);
+  }
+  return out;
+}
+
+/// What was chosen beside the file's inertias, beside inertias that are all free: single links may explain torques only
+/// with masses that no body has, and what else was chosen bends to the nearest that one can have. None where bodies
+/// predict folds as well without. `grams`: those of `given`.
+std::shared_ptr<const Account> freed(const Problem& problem, const TorqueGrams& grams, const std::vector<Noise>& noise,
+                                     const Account& given, double least_gain) {
+  const TorqueDesign& design = *given.design;
+  const int threads = problem.tiles.threads();
+  auto out = std::make_shared<Account>(account_of(given.design,
+                                                  sums_of(grams, noise, design, inertial_columns(design), threads),
+                                                  standard_columns(design), threads));
+  for (std::size_t k = 0; k < given.choice.groups.size(); ++k) {
+    if (is_inertial(design.groups[static_cast<std::size_t>(given.choice.groups[k])])) continue;
+    out->choice.groups.push_back(given.choice.groups[k]);
+    out->choice.scales.push_back(given.choice.scales[k]);
+  }
+  const VectorXd before = squares_with_bodies(problem, given), after = squares_with_bodies(problem, *out);
+  if (!Search::gains_on_folds(before, after, least_gain / given.search->joints())) return {};
+  return out;
+}
+
 // The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
 // well as inertias that are all free, it says more with less. What free inertias take up is named here.
 // `seen`: the model of the free ones.
@@ -177,7 +215,8 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
   SearchLimits more = limits;
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
   more.masses_given = true;
-  const auto searched = [&](const TorqueGrams& train, const Choice& start) {
+  TorqueGrams train = grams;
+  const auto searched = [&](const Choice& start) {
     const std::vector<bool> none(free.design->terms.size(), false);
     const int threads = problem.tiles.threads();
     Account out = account_of(free.design, sums_of(train, noise, *free.design, none, threads),
@@ -186,16 +225,18 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
     out.inertias_given = true;
     return out;
   };
-  Account out = searched(grams, free.choice);
+  Account out = searched(free.choice);
   TorqueModel model = seen;
   if (has_constant_of_drive(out)) {
     // Free inertias take a drive's constant up, and its column with it: now it is the torque that the file's give.
     model = fitted_model(problem, out);
-    out = searched(sum_grams(columns, problem.nominal, model, problem.train, {grams}), out.choice);
+    train = sum_grams(columns, problem.nominal, model, problem.train, {grams});
+    out = searched(out.choice);
   }
   out.choice = without_what_hides(out);
   if (!as_good_as_free(out, free)) return {};
   if (!bodies_can_do_it(problem, out)) return {};
+  out.freed = freed(problem, train, noise, out, limits.least_gain);
   out.held_out = held_out_of(problem, out, model, noise);
   return out;
 }

@@ -835,10 +835,12 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
     out.effects.push_back(std::move(standard));
   out.covariance = covariance_of(*account.design, naming.fit(), parameters_in(out.effects));
   // Errors are those of the robot that is handed over.
-  out.robot = robot_of(problem, account, naming, &out.warnings);
+  const Account& handed_over = account.freed ? *account.freed : account;
+  const Naming of_robot(handed_over);
+  out.robot = robot_of(problem, handed_over, of_robot, &out.warnings);
   const TorqueModel model = model_of(out.robot, problem);
   out.errors = errors_of(problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}});
-  say_errors_with_unknown(problem, account, naming, functions, model, least_gain, &out);
+  say_errors_with_unknown(problem, handed_over, of_robot, functions, model, least_gain, &out);
   const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
   out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);

@@ -132,6 +132,9 @@ struct Account {
   Choice small{};                       ///< fitted beside what was chosen, and too small to be named
   bool inertias_given = false;          ///< links' inertias are the file's, but for those that were chosen
   std::vector<FoldGram> held_out = {};  ///< recordings that nothing was fitted to: of what was chosen alone
+  /// Of given inertias, the same beside inertias that are all free, where folds gain by them: it names nothing, and is
+  /// what is handed over.
+  std::shared_ptr<const Account> freed = {};
 };
 Account account_of(std::shared_ptr<const TorqueDesign> design, Sums sums, std::vector<int> nuisance, int threads);
 
