@@ -67,7 +67,7 @@ def runnable(exported: Exported, callbacks: bool = True) -> Runnable:
     if beside is not None:
         beside.prepare(model)
     return Runnable(
-        exported.robot,
+        exported.alone if beside is None else exported.robot,
         model,
         tuple(link.name for link in chain.links),
         tuple(link.name for link in chain.driven),

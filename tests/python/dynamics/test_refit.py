@@ -21,7 +21,7 @@ from truing.dynamics.export.refit import lacking, training
 from truing.dynamics.runner import runnable
 from truing.dynamics.simulate import judge
 from truing.errors import InputError
-from truing.model import AppliedEffect
+from truing.model import AppliedEffect, Robot
 from truing.testing.dynamics import SimulatedMotion, simulate_motion
 
 HIDDEN = {
@@ -155,6 +155,41 @@ def test_no_written_friction_pushes_at_speeds_that_nobody_recorded(tmp_path: Pat
     for joint in ElementTree.parse(exported.model).iter("joint"):
         powers = np.trim_zeros(np.array(joint.get("damping", "").split(), float), "b")
         assert powers.size == 0 or powers[-1] > 0.0
+
+
+def test_the_constant_of_a_single_drive_is_fitted_anew(
+    simulated: SimulatedMotion, trained: list[Recording], tmp_path: Path
+) -> None:
+    """What it is taken for depends on friction that grows with the load."""
+    exported = export(with_constants(simulated.truth, J3=0.2), "mjcf", tmp_path, recordings=trained)
+    again = refit.fit_without(
+        with_constants(simulated.truth, J3=-0.2), exported.refitted, "mjcf", trained, None, ("J2", "J3")
+    )
+    found = constants(exported.alone)["motor_constant.J3"]
+    assert abs(found) < 0.1
+    assert constants(again)["motor_constant.J3"] == pytest.approx(found, abs=0.02)
+    assert (
+        runnable(exported, callbacks=False).robot is exported.alone
+    )  # measured torques are those of its drive
+    assert runnable(exported).robot is exported.robot
+
+
+def test_constants_of_several_drives_stay(simulated: SimulatedMotion, trained: list[Recording]) -> None:
+    """They share a scale with all masses."""
+    robot = with_constants(simulated.truth, J2=0.01, J3=0.02)
+    kept = refit.fit_without(robot, ["load_friction.J2"], "mjcf", trained, None)
+    assert constants(kept) == {"motor_constant.J2": 0.01, "motor_constant.J3": 0.02}
+
+
+def with_constants(robot: Robot, **sizes: float) -> Robot:
+    told = {f"motor_constant.{joint}": size for joint, size in sizes.items()}
+    constant = AppliedEffect("motor_constant", list(sizes), told)
+    return robot.replace(torque_effects=[*robot.torque_effects, constant])
+
+
+def constants(robot: Robot) -> dict[str, float]:
+    (found,) = [dict(e.parameters) for e in robot.torque_effects if e.effect == "motor_constant"]
+    return found
 
 
 def test_what_was_held_out_is_not_fitted_to(simulated: SimulatedMotion) -> None:

@@ -53,6 +53,7 @@ class Exported:
     callbacks: Path | None  # MuJoCo: what has no field, as a Python module
     not_written: tuple[NotWritten, ...]  # largest first
     robot: _core.Robot = field(repr=False)
+    alone: _core.Robot = field(repr=False)  # what `model` has: `robot`, or what was fitted anew
     chain: Chain = field(repr=False)  # the robot as it was written
     callbacks_model: Path | None = None  # the file that `callbacks` belongs to, if it is not `model`
     refitted: tuple[str, ...] = ()  # parameters without which `model` was fitted anew
@@ -136,6 +137,7 @@ def export(
         beside_it,
         tuple(left),
         robot,
+        alone.robot,
         whole.chain,
         its_model,
         tuple(parameters),

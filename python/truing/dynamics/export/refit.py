@@ -21,8 +21,18 @@ from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.recorded import Recorded
 from truing.errors import InputError
 
-_ANEW = ("coulomb", "viscous", "current_offset", "viscous_law", "stribeck", "presliding", "armature")
-"""Effects that are fitted anew where the robot carries them; the others stay as they are."""
+_ANEW = (
+    "coulomb",
+    "viscous",
+    "current_offset",
+    "viscous_law",
+    "stribeck",
+    "presliding",
+    "armature",
+    "motor_constant",
+)
+"""Effects that are fitted anew where the robot carries them; the others stay as they are. What a drive's
+constant is taken for depends on friction that grows with the load."""
 _OF_MOTION = {"load_friction", "viscous_law", "stribeck", "position_friction"}
 """Laws of friction that one of the speed can stand for in part; what goes with warmth or time it cannot."""
 _TAKEN_UP = _OF_MOTION | {"thermal_friction", "warmup", "presliding", "armature"}
@@ -94,9 +104,9 @@ def fit_without(
     cutoff: float | None,
     bare_joints: Collection[str] = (),
 ) -> _core.Robot:
-    """The robot without these parameters: friction, bodies and rotor inertias fitted anew to all of the
-    recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one. Joints that lose a law of
-    friction get one that the format `to` holds, but for bare_joints.
+    """The robot without these parameters: friction, bodies, rotor inertias and the constant of a single drive
+    fitted anew to all of the recordings. cutoff: [Hz], as the robot was fitted with; None: the usual one.
+    Joints that lose a law of friction get one that the format `to` holds, but for bare_joints.
 
     Raises InputError on recordings that nothing can be fitted to.
     """
@@ -109,6 +119,8 @@ def fit_without(
     ]
     rest = [effect for effect in rest if effect.parameters]
     where = {name: {j for e in rest if e.effect == name for j in e.joints} for name in _ANEW}
+    if len(where["motor_constant"]) > 1:
+        del where["motor_constant"]  # several share a scale with all masses
     lost = {
         joint
         for effect in robot.torque_effects
@@ -122,7 +134,7 @@ def fit_without(
         where["stribeck"] |= lost & where["presliding"]
     options: dict[str, Any] = {} if cutoff is None else {"cutoff": cutoff}
     # Without its range it counts as one that was not fitted before: how friction turns is chosen anew.
-    bare = robot.replace(torque_effects=[e for e in rest if e.effect not in _ANEW], fitted_range={})
+    bare = robot.replace(torque_effects=[e for e in rest if e.effect not in where], fitted_range={})
     motion = [recording.replace(test=False) for recording in given]
 
     def fitted() -> _core.Robot:
