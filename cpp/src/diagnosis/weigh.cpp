@@ -11,6 +11,7 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "math/batch.hpp"
 #include "math/statistics.hpp"
@@ -194,9 +195,9 @@ class FlexibleFit {
 
   /// To what was summed.
   void fit() {
-    const Gram all = total([](std::size_t, std::size_t) { return true; });
+    Gram all = total([](std::size_t, std::size_t) { return true; });
     const Eigen::VectorXd precision = precision_of(all);
-    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_diagonal(all.xx, precision));
+    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(with_diagonal(std::move(all.xx), precision));
     const Eigen::VectorXd solution = factor.solve(all.xy);
     used_ = {};
     if (kinds_.size() == 1) {
@@ -217,8 +218,9 @@ class FlexibleFit {
   Eigen::VectorXd predicted_residual() const {
     std::array<Eigen::VectorXd, kParts> solutions;
     const auto work = [&](std::size_t held_out) {
-      const Gram others = total([&](std::size_t part, std::size_t) { return part != held_out; });
-      solutions[held_out] = factorised(with_diagonal(others.xx, precision_of(others))).solve(others.xy);
+      Gram others = total([&](std::size_t part, std::size_t) { return part != held_out; });
+      const Eigen::VectorXd precision = precision_of(others);
+      solutions[held_out] = factorised(with_diagonal(std::move(others.xx), precision)).solve(others.xy);
     };
     for_each_on_threads(kParts, threads_, {}, work, 1);
     Eigen::VectorXd out = residual_;
@@ -410,8 +412,11 @@ Grams make_grams(const Design& design, double design_effect, int threads) {
   constexpr std::size_t kTogether = 2;  // threads at most, for the sums of each take memory
   const auto some = [&](std::size_t first) {
     GramSum sum(design.x.cols());
-    for (auto f = static_cast<int>(first); f < folds; f += kTogether)
-      grams[static_cast<std::size_t>(f)].add(design.gram_of_fold(f, &sum), 1.0 / design_effect);
+    for (auto f = static_cast<int>(first); f < folds; f += kTogether) {
+      Gram gram = design.gram_of_fold(f, &sum);
+      if (design_effect != 1.0) gram.scale(1.0 / design_effect);
+      grams[static_cast<std::size_t>(f)] = std::move(gram);
+    }
   };
   for_each_on_threads(kTogether, threads, {}, some, 1);
   Grams out;
