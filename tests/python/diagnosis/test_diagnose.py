@@ -811,4 +811,4 @@ def test_a_second_diagnosis_finds_the_memory_that_the_first_one_freed() -> None:
         before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
         truing.diagnose(robot, data, threads=1)
         faults.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
-    assert min(faults[1:]) < 0.2 * faults[0], faults
+    assert min(faults[1:]) < 10_000, faults  # pages; 37 000 before
