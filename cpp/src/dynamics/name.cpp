@@ -851,6 +851,10 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
         "on held-out recordings standard practice, with inertias that are all free, is better than "
         "what was found at " +
         listed(worse));
+  if (account.freed && out.verdict != Verdict::does_not_hold)
+    out.warnings.push_back(
+        "the robot that is handed over has the inertias of all links fitted beside what is named: the named links "
+        "alone explain the torques with masses that no body has, and folds gain by it");
   if (out.verdict == Verdict::does_not_hold) {
     for (FoundTorqueEffect& e : out.effects)
       if (!e.standard) e.probability = std::min(e.probability, kContradicted);

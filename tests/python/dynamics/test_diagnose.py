@@ -232,6 +232,7 @@ def test_links_that_nobody_named_make_room_for_a_drive_s_constant() -> None:
     (drive,) = [e for e in found.robot.torque_effects if e.effect == "motor_constant"]
     assert drive.parameters["motor_constant.elbow_joint"] == pytest.approx(-0.036, abs=0.01)  # -0.006 before
     assert percent(found, "named")[1] < 2.7  # 3.5 before
+    assert any("inertias of all links" in warning for warning in found.warnings)
 
 
 @pytest.mark.realdata
