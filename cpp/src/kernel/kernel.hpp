@@ -112,9 +112,9 @@ struct Functions {
   void (*gram_add_columns)(const double* const* c, int columns, int known, int length, double* acc);
   /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
   void (*gram_reduce)(double* acc, int columns, double* out);
-  /// The same of `count` rows that stand one after the other, `columns` doubles each (a multiple of kRowColumns), for
-  /// few rows at a time: out[i * columns + j] += sum of row[i] row[j], for j >= i at least. `first`: instead of what is
-  /// there.
+  /// C^T C of `count` rows that stand one after the other, `columns` doubles each (a multiple of kRowColumns), for few
+  /// rows at a time: out[i * columns + j] += sum over rows of row[i] row[j], for j >= i at least. `first`: `out` is not
+  /// read, and what stands there is gone.
   void (*gram_add_rows)(const double* rows, int columns, int count, bool first, double* out);
   /// out[i] += (sum over k of row[k] c[k * stride + i])^2 for i below `length` (a multiple of kTilePoses).
   void (*add_squared)(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out);
