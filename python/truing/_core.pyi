@@ -7068,6 +7068,12 @@ class TorqueErrors:
         Joint by joint.
         """
     @property
+    def in_motion(self) -> tuple[TorqueError, ...]:
+        """
+        Joint by joint, of the held-out rows in which it moves: at rest friction is a history, and is not
+        fitted.
+        """
+    @property
     def model(self) -> str:
         """
         'nominal', 'standard', 'named' or 'with_unknown'.

@@ -761,6 +761,7 @@ void take_errors(const Problem& problem, const TorqueModel& model, const std::se
   const TorqueErrors with = errors_of(problem, {{out->model, model}}).front();
   for (const std::size_t j : joints) {
     out->held_out[j] = with.held_out[j];
+    out->in_motion[j] = with.in_motion[j];
     out->train[j] = with.train[j];
   }
 }

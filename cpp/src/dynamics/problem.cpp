@@ -529,7 +529,16 @@ struct Moments {
   }
 };
 
-using ModelMoments = std::vector<std::vector<Moments>>;  // by model and joint
+/// Of one joint.
+struct JointMoments {
+  Moments all, moving;
+
+  void add(const JointMoments& other) {
+    all.add(other.all);
+    moving.add(other.moving);
+  }
+};
+using ModelMoments = std::vector<std::vector<JointMoments>>;  // by model and joint
 
 /// Of one tile, its rows in these folds.
 ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds,
@@ -538,12 +547,15 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
   const VectorXd time = tile->own_time();
   for (const auto& [name, model] : models) {
     const MatrixXd& predicted = kept_torque(model, tile);
-    std::vector<Moments> by_joint(static_cast<std::size_t>(predicted.cols()));
+    std::vector<JointMoments> by_joint(static_cast<std::size_t>(predicted.cols()));
     for (Index i = 0; i < tile->count; ++i) {
       if (folds.fold(tile->recording, time[i]) < 0) continue;
       for (Index j = 0; j < predicted.cols(); ++j) {
         const double y = tile->measured(i, j);
-        if (!std::isnan(y)) by_joint[static_cast<std::size_t>(j)].add(y, predicted(i, j));
+        if (std::isnan(y)) continue;
+        JointMoments& joint = by_joint[static_cast<std::size_t>(j)];
+        joint.all.add(y, predicted(i, j));
+        if (tile->moving(i, j) > 0.0) joint.moving.add(y, predicted(i, j));
       }
     }
     out.push_back(std::move(by_joint));
@@ -552,21 +564,16 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
 }
 
 /// By model and joint.
-std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Problem& problem,
-                                                const std::vector<std::pair<std::string, TorqueModel>>& models) {
-  const std::vector<std::size_t> driven = problem.robot.driven_joints();
+ModelMoments moments_on(const Folds& folds, const Problem& problem,
+                        const std::vector<std::pair<std::string, TorqueModel>>& models) {
   std::vector<ModelMoments> lot(Tiles::kTogether);
-  ModelMoments all(models.size(), std::vector<Moments>(driven.size()));
+  ModelMoments out(models.size(), std::vector<JointMoments>(problem.robot.driven_count()));
   const auto add = [&](std::size_t k) {
     for (std::size_t m = 0; m < models.size(); ++m)
-      for (std::size_t j = 0; j < driven.size(); ++j) all[m][j].add(lot[k][m][j]);
+      for (std::size_t j = 0; j < out[m].size(); ++j) out[m][j].add(lot[k][m][j]);
   };
   problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
                          [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
-  std::vector<std::vector<TorqueError>> out(models.size());
-  for (std::size_t m = 0; m < models.size(); ++m)
-    for (std::size_t j = 0; j < driven.size(); ++j)
-      out[m].push_back(all[m][j].error(problem.robot.joints[driven[j]].name));
   return out;
 }
 
@@ -574,13 +581,18 @@ std::vector<std::vector<TorqueError>> errors_on(const Folds& folds, const Proble
 
 std::vector<TorqueErrors> errors_of(const Problem& problem,
                                     const std::vector<std::pair<std::string, TorqueModel>>& models) {
-  std::vector<std::vector<TorqueError>> held_out = errors_on(problem.test, problem, models);
-  std::vector<std::vector<TorqueError>> train = errors_on(problem.train, problem, models);
+  const ModelMoments held_out = moments_on(problem.test, problem, models);
+  const ModelMoments train = moments_on(problem.train, problem, models);
+  const std::vector<std::size_t> driven = problem.robot.driven_joints();
   std::vector<TorqueErrors> out(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     out[m].model = models[m].first;
-    out[m].held_out = std::move(held_out[m]);
-    out[m].train = std::move(train[m]);
+    for (std::size_t j = 0; j < driven.size(); ++j) {
+      const std::string& joint = problem.robot.joints[driven[j]].name;
+      out[m].held_out.push_back(held_out[m][j].all.error(joint));
+      out[m].in_motion.push_back(held_out[m][j].moving.error(joint));
+      out[m].train.push_back(train[m][j].all.error(joint));
+    }
   }
   return out;
 }

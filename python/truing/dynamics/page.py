@@ -512,7 +512,21 @@ def _error_card(page: Page, result: Mapping[str, Any]) -> None:
     off = any((errors[m][j] or 0.0) > top for m in models for j in joints)
     page.add(
         f'<p class="note">{USUAL}{" Bars that reach the top are cut off: their numbers hold." if off else ""}'
+        f" {escaped(in_motion_sentence(result))}"
         f" {escaped(remainder_sentence(result.get('remainders', ())))}</p></section>"
+    )
+
+
+def in_motion_sentence(result: Mapping[str, Any]) -> str:
+    """What named effects leave where a joint moves; "" where rests make no difference."""
+    errors, moving = (result["torque"].get(rows, {}).get("named", {}) for rows in ("held_out", "in_motion"))
+    texts = {joint: (_percent(errors[joint]), _percent(moving.get(joint))) for joint in errors}
+    if all(one in (other, "–") for other, one in texts.values()):
+        return ""
+    listed = ", ".join(f"{joint} {one}" for joint, (_, one) in texts.items())
+    return (
+        "Rows at rest are counted, where friction is what earlier motion left, and a recording that begins"
+        f" at rest does not show that motion. Where the joint moves, named effects leave {listed}."
     )
 
 

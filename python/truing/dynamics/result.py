@@ -168,7 +168,7 @@ def _not_testable(n: _core.NotTestable) -> dict[str, Any]:
 
 def _errors(errors: Sequence[_core.TorqueErrors]) -> dict[str, Any]:
     """By set, model and joint: in % of the torque's standard deviation, and in Nm (N)."""
-    sets = ("held_out", "train")
+    sets = ("held_out", "in_motion", "train")
     return {
         key: {
             name: {e.model: {one.joint: getattr(one, field) for one in getattr(e, name)} for e in errors}

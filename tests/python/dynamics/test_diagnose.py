@@ -50,6 +50,27 @@ def percent(found: truing.dynamics.TorqueDiagnosis, model: str) -> np.ndarray:
     return np.array([e.percent for e in errors.held_out])
 
 
+def test_errors_in_motion_do_not_count_rows_at_rest() -> None:
+    """Before the first motion nobody knows what friction holds: a second of it, with what it might."""
+    *train, last = SIMULATED.recordings
+
+    def errors_with(held: float) -> truing.dynamics.TorqueErrors:
+        rows = 100
+        first = np.repeat(np.asarray(last.position)[:1], rows, axis=0)
+        torque = np.vstack([np.repeat(np.asarray(last.torque)[:1], rows, axis=0), last.torque])
+        torque[: rows // 2] += held
+        time = np.arange(len(torque)) * (last.time[1] - last.time[0])
+        position = np.vstack([first, last.position])
+        rested = Recording("rested", time=time, position=position, torque=torque, test=True)
+        return identify(SIMULATED.nominal, [*train, rested], effects=["coulomb", "viscous"]).errors[-1]
+
+    free, held = errors_with(0.0), errors_with(20.0)
+    for j, joint in enumerate(held.in_motion):
+        assert joint.n < held.held_out[j].n - 10
+        assert joint.rms == pytest.approx(free.in_motion[j].rms, rel=0.01)
+        assert held.held_out[j].rms > 1.05 * free.held_out[j].rms
+
+
 def test_hidden_effects_are_named_with_their_sizes() -> None:
     found = diagnose(SIMULATED.nominal, SIMULATED.recordings)
     named = beyond_standard(found)

@@ -48,7 +48,9 @@ struct TorqueError {
 struct TorqueErrors {
   std::string model;                  ///< 'nominal', 'standard', 'named' or 'with_unknown'
   std::vector<TorqueError> held_out;  ///< joint by joint
-  std::vector<TorqueError> train;     ///< joint by joint
+  /// Joint by joint, of the held-out rows in which it moves: at rest friction is a history, and is not fitted.
+  std::vector<TorqueError> in_motion;
+  std::vector<TorqueError> train;  ///< joint by joint
 };
 
 /// What a fit of torques found.
