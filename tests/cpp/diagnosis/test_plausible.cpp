@@ -48,6 +48,18 @@ bool is_named(const Diagnosis& d, const std::string& effect, const std::string& 
   });
 }
 
+/// A table-top arm: 0.4 m of reach, a thirtieth of the weights.
+Robot small_arm() {
+  Robot out = ur10();
+  for (truing::Joint& joint : out.joints) {
+    joint.a *= 0.3;
+    joint.d *= 0.3;
+    joint.mass = *joint.mass / 30.0;
+    joint.center_of_mass *= 0.3;
+  }
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("a harmonic four times as large as machines have them is unknown, and said to look like one") {
@@ -102,6 +114,17 @@ TEST_CASE("a vertical joint of a base that leans a little is no spring" * doctes
     CHECK(!is_named(d, "joint_compliance", "J1"));
     CHECK(!is_named(d, "stiffness_zones", "J1"));
   }
+}
+
+TEST_CASE("a joint that is as soft as the smallest strain wave gears is a spring") {
+  Robot truth = small_arm();
+  truth.T_measurement_base = somewhere();
+  truth.effects = {{"joint_compliance", {"J3"}, {{"joint_compliance.J3", 1.0 / 90.0}}}};
+  const auto table = measured(truth, 200, 81, 2, [](const Table&, std::size_t) { return 0.0; });
+  const Diagnosis d = diagnose(small_arm(), table->data);
+  INFO(d.sentence);
+  CHECK(is_named(d, "joint_compliance", "J3"));
+  CHECK(d.unknown.empty());
 }
 
 TEST_CASE("effects of a usual size are named as ever") {

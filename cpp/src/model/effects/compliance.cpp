@@ -241,6 +241,10 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
   return terms;
 }
 
+// The softest gear that is sold: a strain wave gear of size 3 has 27 Nm/rad (Harmonic Drive, RSF supermini series,
+// manual, "torsional stiffness": RSF-3C 27 to 34 Nm/rad, RSF-5B 90 to 150 Nm/rad).
+constexpr double kSoftestGear = 1.0 / 27.0;  // [rad/Nm]
+
 Effect joint_compliance_effect() {
   Effect effect{"joint_compliance", "the joint gives way under the weight that it carries", joint_compliance};
   EffectTraits& traits = effect.traits;
@@ -254,7 +258,7 @@ Effect joint_compliance_effect() {
       {"stiffness_zones", Containment::special_case, "a spring with three zones can be a plain one"}};
   traits.separated_by = {{Experiment::target_on_elbow, "link_compliance"}, {Experiment::another_payload}};
   traits.usual = 2e-6;
-  traits.plausible = 5e-3;
+  traits.plausible = kSoftestGear;
   traits.if_negative =
       "no joint gives way against its weight: where a robot hangs from a ceiling, `gravity` of its file says so";
   traits.documentation = {"c · gravity torque τ", "`joint_compliance.J2` [rad/Nm, m/N]",
@@ -272,7 +276,7 @@ Effect stiffness_zones_effect() {
   traits.mimicked_by = {"windup"};
   traits.separated_by = {{Experiment::another_payload}};
   traits.usual = 2e-6;
-  traits.plausible = 5e-3;
+  traits.plausible = kSoftestGear;
   traits.main_part = "c1";
   traits.documentation = {"c₁, c₂, c₃ · the part of τ in each zone of \\|τ\\|; zones part the data's \\|τ\\| in thirds",
                           "`stiffness_zones.J2.c1` … `c3` [rad/Nm]", "the same"};
