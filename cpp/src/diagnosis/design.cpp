@@ -12,6 +12,7 @@
 
 #include <Eigen/Geometry>
 
+#include "diagnosis/linearise.hpp"
 #include "diagnosis/rows.hpp"
 #include "estimation/evaluate.hpp"
 #include "estimation/selection.hpp"
@@ -84,7 +85,7 @@ class Designer {
       : task_(task),
         out_(*out),
         model_(make_model(task.at, task.data, requests_of(out->candidates), task.options.own_effects)),
-        bases_(make_bases(model_, task.data)),
+        bases_(make_bases(model_, task.data, links_as_drawn(task.at, task.nominal))),
         segments_(make_segments(task.data, task.rows)),
         content_(content_of(model_, segments_)) {}
 

@@ -112,7 +112,7 @@ Work prepare(Registered given, const std::optional<Linearisation>& there = {}) {
     if (!work.given.set[static_cast<std::size_t>(row)]) train_rows.push_back(row);
   }
   work.linear = there ? *there : linearise(robot, data, train_rows, options.rotation_length, options.threads);
-  work.inputs = make_inputs(work.linear.at, data);
+  work.inputs = make_inputs(links_as_drawn(work.linear.at, robot), data);
   work.design = make_design({robot, work.linear.at, work.linear.shift, data, work.inputs, every_row, work.given.set,
                              work.given.cluster, options, work.given.inferred_direction});
   work.samplings = samplings(work.design, work.inputs, robot);
@@ -546,7 +546,8 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
 
   // 8. How far: the exact refit, on all rows.
   std::vector<InputColumn> of_all_rows;
-  if (thinned && has_functions(work, decision)) of_all_rows = make_inputs(work.linear.at, whole.data);
+  if (thinned && has_functions(work, decision))
+    of_all_rows = make_inputs(links_as_drawn(work.linear.at, whole.frames.robot), whole.data);
   const std::vector<InputColumn>& inputs = thinned ? of_all_rows : work.inputs;
   const Fitted fitted = fit_exactly(whole, work, inputs, robot, decision, resampled, &result);
   judge_noise(noise_of_repeats(whole.data), work, decision, &result);

@@ -95,4 +95,17 @@ Linearisation linearise(const Robot& frames, const Measurements& data, const std
   return out;
 }
 
+Robot links_as_drawn(Robot at, const Robot& nominal) {
+  for (std::size_t k = 0; k < at.joints.size(); ++k) {
+    Joint& joint = at.joints[k];
+    const Joint& drawn = nominal.joints[k];
+    joint.d = drawn.d;
+    joint.a = drawn.a;
+    joint.alpha = drawn.alpha;
+    joint.beta = drawn.beta;
+    joint.T_parent_joint = drawn.T_parent_joint;
+  }
+  return at;
+}
+
 }  // namespace truing::diagnosis

@@ -24,4 +24,8 @@ struct Linearisation {
 Linearisation linearise(const Robot& frames, const Measurements& data, const std::vector<std::int32_t>& rows,
                         double rotation_length, int threads);
 
+/// A linearisation with its links as drawn: where weights and other inputs of laws are looked at. What the data cannot
+/// tell from the tool is partly in the last links, and would load a balanced joint to a side that nobody knows.
+Robot links_as_drawn(Robot at, const Robot& nominal);
+
 }  // namespace truing::diagnosis

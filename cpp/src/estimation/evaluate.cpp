@@ -91,6 +91,10 @@ static void set_joints(const Model& model, const Eigen::VectorXd& reading, Eigen
 }
 
 std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data) {
+  return make_bases(model, data, model.robot);
+}
+
+std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data, const Robot& weighed) {
   std::vector<std::vector<double>> bases(model.terms.size(), std::vector<double>(data.rows));
   if (model.terms.empty()) return bases;
   const bool gravity =
@@ -106,11 +110,10 @@ std::vector<std::vector<double>> make_bases(const Model& model, const Measuremen
     for (std::size_t k = 0; k < data.joints.size(); ++k) reading[static_cast<Eigen::Index>(k)] = data.joints[k][row];
     set_joints(model, reading, &inputs.joints);
     if (gravity) {
-      inputs.frames = forward_kinematics(model.robot, reading, 0);
+      inputs.frames = forward_kinematics(weighed, reading, 0);
       const auto target = data.target.empty() ? 0 : static_cast<std::size_t>(data.target[row]);
-      inputs.tip =
-          inputs.frames[model.robot.joints.size() - 1] * model.robot.targets[target].T_last_target.translation();
-      gravity_torques_at(model.robot, coupling, inputs.frames, data.payload ? data.payload[row] : 0.0,
+      inputs.tip = inputs.frames[weighed.joints.size() - 1] * weighed.targets[target].T_last_target.translation();
+      gravity_torques_at(weighed, coupling, inputs.frames, data.payload ? data.payload[row] : 0.0,
                          inputs.gravity_torque);
     }
     for (std::size_t t = 0; t < model.terms.size(); ++t) {

@@ -35,6 +35,8 @@ std::vector<Segment> make_segments(const Measurements& data, const std::vector<s
 /// Basis values of every term for every row: they depend on recorded inputs (and, for gravity, on the model's own
 /// robot) only.
 std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data);
+/// The same where the weights are looked at on another robot: one of the same joints, whose links are elsewhere.
+std::vector<std::vector<double>> make_bases(const Model& model, const Measurements& data, const Robot& weighed);
 
 /// What is known of the free parameters beforehand: weight * (value - center)^2 is added to the cost.
 struct Prior {
