@@ -747,6 +747,16 @@ static Decision explain(Work* work, const Robot& robot) {
   return out;
 }
 
+/// Without the functions that correct laws: beside them a law's own parts say little.
+static Evidence::State with_plain_laws(const Work& work, const Decision& decision) {
+  std::vector<int> corrections;
+  for (const auto& [function, law] : decision.corrects) {
+    if (law >= 0) corrections.push_back(function);
+  }
+  return corrections.empty() ? decision.state
+                             : evidence_now(work).evaluate(without_these(decision.state.choice, corrections));
+}
+
 Decision decide(Work* work, const Robot& robot) {
   const std::size_t groups = work->design.candidates.groups.size();
   const Grams grams = work->grams;
@@ -754,11 +764,13 @@ Decision decide(Work* work, const Robot& robot) {
   for (;;) {
     Decision out = explain(work, robot);
     const std::vector<TooLarge> more = too_large_in(*work, out.state);
-    if (more.empty()) {
+    const std::vector<TooLarge> misshapen = out_of_proportion_in(*work, with_plain_laws(*work, out));
+    if (more.empty() && misshapen.empty()) {
       out.too_large = std::move(aside);
       return out;
     }
     set_aside(more, groups, grams, work);
+    set_aside(misshapen, groups, grams, work);
     aside.insert(aside.end(), more.begin(), more.end());
   }
 }

@@ -282,6 +282,8 @@ class Gears {
 
 /// Chosen effects of the catalogue that are, for sure, larger than plausible.
 std::vector<TooLarge> too_large_in(const Work& work, const Evidence::State& state);
+/// Chosen effects whose parts are, for sure, of sizes that no machine has side by side.
+std::vector<TooLarge> out_of_proportion_in(const Work& work, const Evidence::State& state);
 /// They are candidates no more. Columns that were appended since there were `groups` of them go as well.
 void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const Grams& grams, Work* work);
 /// Warns of parameters below zero that no machine has so.

@@ -57,6 +57,44 @@ std::vector<TooLarge> too_large_in(const Work& work, const Evidence::State& stat
   return out;
 }
 
+/// Columns of a group in the order of a state's, the main part first; none: it has no such parts.
+static std::vector<Eigen::Index> main_part_and_others(const Work& work, const Evidence::State& state, int group) {
+  const std::string& main =
+      effect_traits(work, work.design.candidates.named[static_cast<std::size_t>(group)]).main_part;
+  const std::vector<int>& columns = work.design.candidates.groups[static_cast<std::size_t>(group)].columns;
+  std::vector<Eigen::Index> out;
+  for (std::size_t k = 0; k < state.columns.size(); ++k) {
+    if (std::find(columns.begin(), columns.end(), state.columns[k]) == columns.end()) continue;
+    const std::string& name = work.design.column_names[static_cast<std::size_t>(state.columns[k])];
+    const bool is_main = name.substr(name.rfind('.') + 1) == main;
+    out.insert(is_main ? out.begin() : out.end(), static_cast<Eigen::Index>(k));
+  }
+  return out;
+}
+
+/// The main part is, for sure, more than so many times each of the others.
+static bool stands_out(const Evidence::State& state, const std::vector<Eigen::Index>& parts, double times) {
+  return std::all_of(parts.begin() + 1, parts.end(), [&](Eigen::Index other) {
+    Eigen::VectorXd excess = Eigen::VectorXd::Zero(state.solution.size());
+    excess[parts[0]] = 1.0;
+    excess[other] = -times;
+    const double sigma = std::sqrt(std::max(0.0, state.sigma2 * excess.dot(state.factor.solve(excess))));
+    return excess.dot(state.solution) > kForSure * sigma;
+  });
+}
+
+std::vector<TooLarge> out_of_proportion_in(const Work& work, const Evidence::State& state) {
+  std::vector<TooLarge> out;
+  for (const int g : state.choice.groups) {
+    const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
+    const double times = effect_traits(work, e).most_times_others;
+    if (e.kind != Explanation::Kind::catalogue || !(times > 0.0)) continue;
+    const std::vector<Eigen::Index> parts = main_part_and_others(work, state, g);
+    if (parts.size() > 1 && stands_out(state, parts, times)) out.push_back({g});
+  }
+  return out;
+}
+
 void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const Grams& grams, Work* work) {
   Design& design = work->design;
   const Eigen::Index columns = grams.train.xx.cols();

@@ -127,6 +127,26 @@ TEST_CASE("a joint that is as soft as the smallest strain wave gears is a spring
   CHECK(d.unknown.empty());
 }
 
+TEST_CASE("what gives way under the first torque and no more is play that closes, no gear of three stiffnesses") {
+  Robot truth = ur10();
+  truth.T_measurement_base = somewhere();
+  const auto torque = [&truth](const Table& t, std::size_t row) {
+    Eigen::VectorXd reading(6);
+    for (Eigen::Index k = 0; k < 6; ++k) reading[k] = t.data.joints[static_cast<std::size_t>(k)][row];
+    return truing::gravity_torques(truth, reading, 0.0)[1];
+  };
+  for (const unsigned seed : {91u, 92u, 93u}) {
+    const auto table = measured(truth, 300, seed, 1, [&](const Table& t, std::size_t row) {
+      return 2e-4 * std::tanh(torque(t, row) / 12.0);  // of 160 Nm
+    });
+    const Diagnosis d = diagnose(ur10(), table->data);
+    CAPTURE(seed);
+    INFO(d.sentence);
+    CHECK(is_named(d, "gravity_backlash", "J2"));
+    CHECK(!is_named(d, "stiffness_zones", "J2"));
+  }
+}
+
 TEST_CASE("effects of a usual size are named as ever") {
   Robot truth = ur10();
   truth.T_measurement_base = somewhere();

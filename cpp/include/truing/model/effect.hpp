@@ -171,6 +171,8 @@ struct EffectTraits {
   double plausible = 0.0;     ///< no machine in working order has more, in the same unit; 0: unknown
   std::string if_negative{};  ///< what a parameter below zero may mean, where machines have none; empty: they do
   std::string main_part{};    ///< which of several parameters is meant by the effect's name alone, "cos1"
+  /// No machine has a main part of more than so many times each of the other parameters; 0: any.
+  double most_times_others = 0.0;
   ReportUnit reported{};
   EffectDocumentation documentation{};
 };

@@ -245,6 +245,10 @@ std::vector<Term> link_compliance(const Robot& robot, std::size_t joint, const M
 // manual, "torsional stiffness": RSF-3C 27 to 34 Nm/rad, RSF-5B 90 to 150 Nm/rad).
 constexpr double kSoftestGear = 1.0 / 27.0;  // [rad/Nm]
 
+// Strain wave gears have K3 up to twice K1 (Harmonic Drive, RSF-B mini series, manual, "torsional stiffness"). What
+// gives way under the first few newton metres and hardly beyond is no gear, but play that closes.
+constexpr double kLargestHardening = 3.0;
+
 Effect joint_compliance_effect() {
   Effect effect{"joint_compliance", "the joint gives way under the weight that it carries", joint_compliance};
   EffectTraits& traits = effect.traits;
@@ -278,6 +282,7 @@ Effect stiffness_zones_effect() {
   traits.usual = 2e-6;
   traits.plausible = kSoftestGear;
   traits.main_part = "c1";
+  traits.most_times_others = kLargestHardening;
   traits.documentation = {"c₁, c₂, c₃ · the part of τ in each zone of \\|τ\\|; zones part the data's \\|τ\\| in thirds",
                           "`stiffness_zones.J2.c1` … `c3` [rad/Nm]", "the same"};
   return effect;
