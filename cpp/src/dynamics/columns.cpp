@@ -223,15 +223,15 @@ const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<Mat
   return place;
 }
 
-void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const {
-  const auto is_made = [&](const TorqueTerm& term) {
-    return wanted(term) &&
+void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&, int)>& wanted, Tables* tables) const {
+  const auto is_made = [&](const TorqueTerm& term, int column) {
+    return wanted(term, column) &&
            std::any_of(term.joints.begin(), term.joints.end(), [&](std::size_t j) { return (*tables)[j].rows() > 0; });
   };
   const auto any = [&](bool TorqueTerm::* needs) {
     return std::any_of(columns_.begin(), columns_.end(), [&](int c) {
       const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
-      return term.link_parameter < 0 && term.*needs && is_made(term);
+      return term.link_parameter < 0 && term.*needs && is_made(term, c);
     });
   };
   if (any(&TorqueTerm::needs_rigid)) fill_rigid(&tile->motion);
@@ -244,7 +244,7 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)
   std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place
   for (const int c : columns_) {
     const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
-    const bool of_link = term.link_parameter >= 0, now = is_made(term);
+    const bool of_link = term.link_parameter >= 0, now = is_made(term, c);
     const auto same = term.column.empty() ? made_already.end() : made_already.find(term.column);
     const bool copied = same != made_already.end();
     const MatrixXd values = of_link || copied || !now ? MatrixXd() : term.basis(tile->motion);
@@ -269,20 +269,24 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&)
   clear_tables(&tile->motion);
 }
 
-void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use) const {
+void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use,
+                        const std::vector<bool>& idle) const {
   Tables made;
   Tables& tables = kept_.empty() ? made : kept_[tile->number];
-  if (tables.empty()) {
+  const bool fresh = tables.empty();
+  if (fresh) {
     for (std::size_t j = 0; j < by_joint_.size(); ++j) {
       const bool wanted = resting_ == Resting::made || tile->moving.col(static_cast<Index>(j)).any();
       tables.emplace_back(wanted ? tile->count : 0, static_cast<Index>(by_joint_[j].size()) + 1);
     }
-    fill(tile, [](const TorqueTerm& term) { return !term.needs_torque; }, &tables);
+    fill(tile, [](const TorqueTerm& term, int) { return !term.needs_torque; }, &tables);
   } else if (stale_[tile->number] != 0) {
-    fill(tile, looks_at_direction, &tables);
+    fill(tile, [](const TorqueTerm& term, int) { return looks_at_direction(term); }, &tables);
   }
   if (!kept_.empty()) stale_[tile->number] = 0;
-  if (with_torque && needs_torque_) fill(tile, [](const TorqueTerm& term) { return term.needs_torque; }, &tables);
+  const auto stays = [&](int c) { return !fresh && !idle.empty() && idle[static_cast<std::size_t>(c)]; };
+  if (with_torque && needs_torque_)
+    fill(tile, [&](const TorqueTerm& term, int c) { return term.needs_torque && !stays(c); }, &tables);
   use(tables);
 }
 
@@ -291,12 +295,13 @@ void DesignColumns::turned() { std::fill(stale_.begin(), stale_.end(), 1); }
 namespace {
 
 /// Columns of a joint that are as they were, then the others.
-SumOrder order_of(const TorqueDesign& design, const std::vector<int>& columns, const EarlierSums& earlier) {
+SumOrder order_of(const TorqueDesign& design, const std::vector<int>& columns, const EarlierSums& earlier, bool kept) {
   SumOrder out;
   std::vector<Index> others;
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const TorqueTerm& term = design.terms[static_cast<std::size_t>(columns[k])];
-    const bool known = earlier.grams && !term.needs_torque && !(earlier.turned && looks_at_direction(term));
+    const bool stays = kept && !earlier.idle.empty() && earlier.idle[static_cast<std::size_t>(columns[k])];
+    const bool known = earlier.grams && (!term.needs_torque || stays) && !(earlier.turned && looks_at_direction(term));
     (known ? out.columns : others).push_back(static_cast<Index>(k));
   }
   out.known = static_cast<Index>(out.columns.size());
@@ -320,7 +325,7 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
   std::vector<SumOrder> orders;
   for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j) {
     out->emplace_back(columns.of_joint(j), columns.design().terms.size(), folds.count);
-    orders.push_back(order_of(columns.design(), columns.of_joint(j), earlier));
+    orders.push_back(order_of(columns.design(), columns.of_joint(j), earlier, columns.are_kept()));
   }
   std::vector<TileGrams> lot(Tiles::kTogether);
   const auto work = [&](Tile& tile, std::size_t k) {
@@ -329,9 +334,10 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
       set_torque(seen, &tile);
     else
       set_direction(seen.turns(), &tile);
-    columns.use(&tile, true, [&](DesignColumns::Tables& tables) {
+    const auto sum = [&](DesignColumns::Tables& tables) {
       lot[k] = grams_of(&tables, tile, predicted, folds, orders, rows);
-    });
+    };
+    columns.use(&tile, true, sum, earlier.idle);
   };
   const auto add = [&](std::size_t k) {
     for (std::size_t j = 0; j < out->size(); ++j) {

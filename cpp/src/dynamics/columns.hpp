@@ -37,13 +37,15 @@ class DesignColumns {
   /// Numbers of the design's columns that a joint's torque has here, ascending.
   const std::vector<int>& of_joint(std::size_t joint) const { return by_joint_[joint]; }
 
-  /// Calls use(tables) of a tile. Columns that need a torque are there if `with_torque`, by Motion::torque.
-  void use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use) const;
+  /// Calls use(tables) of a tile. Columns that need a torque are there if `with_torque`, by Motion::torque; where they
+  /// are kept those that are `idle`, by column of the design, stay as they were.
+  void use(Tile* tile, bool with_torque, const std::function<void(Tables&)>& use,
+           const std::vector<bool>& idle = {}) const;
   /// Friction turns otherwise now: columns that look at the direction are made anew.
   void turned();
 
  private:
-  void fill(Tile* tile, const std::function<bool(const TorqueTerm&)>& wanted, Tables* tables) const;
+  void fill(Tile* tile, const std::function<bool(const TorqueTerm&, int column)>& wanted, Tables* tables) const;
   /// The filtered columns of the links, kept with the tile where tables are.
   const std::vector<Eigen::MatrixXd>& links_of(Tile* tile, std::vector<Eigen::MatrixXd>* made) const;
 
@@ -69,6 +71,8 @@ std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subt
 struct EarlierSums {
   TorqueGrams grams = nullptr;
   bool turned = false;
+  /// By column of the design; empty: none. Nobody will choose them, so the torque that they saw will do.
+  std::vector<bool> idle{};
 };
 
 /// Rows of a joint: those that are fitted, in which it moves, or all that are judged.

@@ -230,7 +230,8 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
   if (has_constant_of_drive(out)) {
     // Free inertias take a drive's constant up, and its column with it: now it is the torque that the file's give.
     model = fitted_model(problem, out);
-    train = sum_grams(columns, problem.nominal, model, problem.train, {grams});
+    train =
+        sum_grams(columns, problem.nominal, model, problem.train, {grams, false, out.search->idle_flights(out.choice)});
     out = searched(out.choice);
   }
   out.choice = without_what_hides(out);
@@ -305,6 +306,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   TorqueGrams grams = sum_grams(*columns, problem.nominal, model, problem.train);
   std::vector<Noise> noise = noise_of_all(problem, *columns, grams, groundwork.noise);
   Choice choice;
+  std::vector<bool> idle;
   // The torque that some terms need is that of the model found in the round before. What was chosen over another torque
   // than it makes now leaves errors that are no noise, in which what would mend them drowns: so noise is what
   // everything leaves, and only in the last round what the model found leaves.
@@ -320,11 +322,12 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
         model = model.turning(problem.range.turns);
       }
     }
-    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train, {grams, turned});
+    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train, {grams, turned, idle});
     const Sums sums = sums_of(grams, noise, *design, priors, options.threads);
     const Search search(*design, sums, nuisance, options.threads);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);
     model = fitted_model(problem, *design, sums, search, choice);
+    idle = search.idle_flights(choice);
     if (round + 2 >= kRounds) noise = noise_of(problem.tiles, model, problem.train);
   }
   Account free = account_of(design, sums_of(grams, noise, *design, priors, options.threads), nuisance, options.threads);

@@ -146,6 +146,19 @@ const std::vector<Evidence::Gain>& Search::gains(const Choice& choice) const {
   return seen.gains;
 }
 
+std::vector<bool> Search::idle_flights(const Choice& choice) const {
+  std::vector<bool> out(design_.terms.size(), false);
+  const std::vector<Evidence::Gain>&alone = gains({}), &beside = gains(choice);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const bool chosen =
+        std::find(choice.groups.begin(), choice.groups.end(), static_cast<int>(g)) != choice.groups.end();
+    if (chosen || alone[g].score > 0.0 || beside[g].score > 0.0) continue;
+    for (const int c : groups_[g].columns)
+      out[static_cast<std::size_t>(c)] = design_.terms[static_cast<std::size_t>(c)].needs_inertia;
+  }
+  return out;
+}
+
 const VectorXd& Search::squares_of_folds(const Choice& choice) const {
   Look& seen = look(choice);
   if (seen.squares.size() == 0) {

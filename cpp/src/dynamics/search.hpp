@@ -81,6 +81,9 @@ class Search {
   const Evidence::State& state(const Choice& choice) const { return look(choice).state; }
   /// What every group would add to it.
   const std::vector<Evidence::Gain>& gains(const Choice& choice) const;
+  /// By column of the design: flights through a play that win nothing, neither beside the choice nor beside what is
+  /// always in. They are most of the columns that need a torque, and hardly change with it.
+  std::vector<bool> idle_flights(const Choice& choice) const;
 
   /// Squared error of every fold, by the fit to the others.
   const Eigen::VectorXd& squares_of_folds(const Choice& choice) const;

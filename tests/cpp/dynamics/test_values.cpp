@@ -119,6 +119,33 @@ TEST_CASE("sums with what is known from before are those made anew, to the bit")
   CHECK((*turned)[0].folds[0].xx != (*seen)[0].folds[0].xx);
 }
 
+TEST_CASE("columns that are idle keep the torque that they saw until they are not, and others do not") {
+  const std::vector<Recording> recordings = recorded();
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign design = whole(problem);
+  const TorqueModel more = with_more(problem.nominal, design);
+  DesignColumns columns(problem.tiles, design);
+  const TorqueGrams before = sum_grams(columns, problem.nominal, problem.nominal, problem.train);
+  const std::vector<int>& of_joint = columns.of_joint(0);
+  std::vector<bool> idle(design.terms.size(), false);
+  std::vector<Eigen::Index> resting, working;
+  for (std::size_t k = 0; k < of_joint.size(); ++k) {
+    const auto c = static_cast<std::size_t>(of_joint[k]);
+    if (!design.terms[c].needs_torque) continue;
+    idle[c] = resting.size() <= working.size();
+    (idle[c] ? resting : working).push_back(static_cast<Eigen::Index>(k));
+  }
+  REQUIRE(!working.empty());
+  const auto product = [](const TorqueGrams& grams, const std::vector<Eigen::Index>& at) -> Eigen::MatrixXd {
+    return (*grams)[0].folds[0].xx(at, at);
+  };
+  const TorqueGrams some = sum_grams(columns, problem.nominal, more, problem.train, {before, false, idle});
+  const TorqueGrams anew = sum_grams(DesignColumns(problem.tiles, design), problem.nominal, more, problem.train);
+  CHECK(product(some, resting) == product(before, resting));
+  CHECK(product(some, working) == product(anew, working));
+  check_same(sum_grams(columns, problem.nominal, more, problem.train, {some}), anew);
+}
+
 TEST_CASE("sums of some columns are those that all columns have, to the bit") {
   const std::vector<Recording> recordings = recorded();
   Problem problem(level_arm(), recordings, {});
