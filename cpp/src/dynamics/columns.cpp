@@ -99,7 +99,7 @@ class TableSum {
                                            static_cast<int>(all), sums_.data());
     }
     products_.setZero(columns, columns);
-    kernel::functions().gram_reduce(sums_.data(), columns, products_.data());
+    kernel::functions().gram_reduce(sums_.data(), columns, static_cast<int>(order.known), products_.data());
     return in_place(order, static_cast<double>(count));
   }
 

@@ -14,6 +14,7 @@
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
 #include "dynamics/search.hpp"
+#include "math/batch.hpp"
 
 namespace truing {
 using namespace dynamics;
@@ -173,8 +174,8 @@ VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
   const Evidence::State& state = account.search->state(account.choice);
   const std::vector<FoldGram>& folds = account.sums->folds;
   VectorXd out(static_cast<Eigen::Index>(folds.size()));
-  std::vector<std::string> said_later;
-  for (std::size_t f = 0; f < folds.size(); ++f) {
+  const auto fit_without = [&](std::size_t f) {
+    std::vector<std::string> said_later;
     const Gram held = folds[f].of(state.columns);
     Sums others{{}, account.sums->all, account.sums->precision};
     others.all.xx(state.columns, state.columns) -= held.xx;
@@ -182,7 +183,8 @@ VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
     const Fit fit = with_bodies(problem.robot, *account.design, others, fit_of(others, state.columns, state.precision),
                                 &said_later);
     out[static_cast<Eigen::Index>(f)] = held.yy - 2.0 * fit.values.dot(held.xy) + fit.values.dot(held.xx * fit.values);
-  }
+  };
+  math::for_each_on_threads(folds.size(), problem.tiles.threads(), {}, fit_without, 1);
   return out;
 }
 

@@ -78,7 +78,7 @@ class JointSums {
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       const Eigen::Index columns = rows_[k].cols(), x = columns - 1;
       Eigen::MatrixXd all = Eigen::MatrixXd::Zero(columns, columns);
-      kernel::functions().gram_reduce(sums_[k].data(), static_cast<int>(columns), all.data());
+      kernel::functions().gram_reduce(sums_[k].data(), static_cast<int>(columns), 0, all.data());
       estimation::Gram gram;
       gram.xx = all.topLeftCorner(x, x).selfadjointView<Eigen::Upper>();
       gram.xy = all.col(x).head(x);

@@ -175,7 +175,7 @@ Eigen::MatrixXd clustered_scores(const FittedRows& fitted, const Eigen::VectorXd
     add_products(fold(some, cluster, &scores), &scores, &sums);
   }
   Eigen::MatrixXd upper = Eigen::MatrixXd::Zero(p, p);
-  run.gram_reduce(sums.data(), p, upper.data());
+  run.gram_reduce(sums.data(), p, 0, upper.data());
   return upper.selfadjointView<Eigen::Upper>();
 }
 

@@ -454,7 +454,7 @@ struct Evaluator::Impl {
     const int local = static_cast<int>(map.size()) + 1;
     const int p = static_cast<int>(free.size()) + 1;
     std::fill(w->local.begin(), w->local.begin() + local * local, 0.0);
-    run.gram_reduce(w->accumulator.get(), local, w->local.data());
+    run.gram_reduce(w->accumulator.get(), local, 0, w->local.data());
     for (int j = 0; j < local; ++j) {
       const int gj = j + 1 < local ? map[j] : p - 1;
       for (int i = 0; i <= j; ++i) {

@@ -380,8 +380,9 @@ void gram_add_columns(const double* const* c, int columns, int known, int length
   add_products([&](int k) { return c[k]; }, columns, known, length, acc);
 }
 
-void gram_reduce(double* acc, int columns, double* out) {
+void gram_reduce(double* acc, int columns, int known, double* out) {
   for_blocks(columns, [&](int i, int j, std::size_t at) {
+    if (j + kCols <= known) return;
     for (int m = 0; m < kRows; ++m) {
       for (int n = 0; n < kCols; ++n) {
         double total = 0.0;

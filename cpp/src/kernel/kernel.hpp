@@ -110,8 +110,9 @@ struct Functions {
   void (*gram_add)(const double* c, std::ptrdiff_t stride, int columns, int known, int length, double* acc);
   /// The same of columns that stand anywhere.
   void (*gram_add_columns)(const double* const* c, int columns, int known, int length, double* acc);
-  /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared.
-  void (*gram_reduce)(double* acc, int columns, double* out);
+  /// Sums the lanes: upper triangle of `out` (columns x columns, column-major) += acc; acc is cleared. `known`: as it
+  /// was when acc was added to.
+  void (*gram_reduce)(double* acc, int columns, int known, double* out);
   /// C^T C of `count` rows that stand one after the other, `columns` doubles each (a multiple of kRowColumns), for few
   /// rows at a time: out[i * columns + j] += sum over rows of row[i] row[j], for j >= i at least. `first`: `out` is not
   /// read, and what stands there is gone.

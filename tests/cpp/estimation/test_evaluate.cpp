@@ -348,7 +348,7 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     // Gram of an odd number of columns.
     std::vector<double> acc(f->gram_size(columns), 0.0), out(columns * columns, 0.0);
     f->gram_add(c.data(), length, columns, 0, length, acc.data());
-    f->gram_reduce(acc.data(), columns, out.data());
+    f->gram_reduce(acc.data(), columns, 0, out.data());
     for (int j = 0; j < columns; ++j) {
       for (int i = 0; i <= j; ++i)
         CHECK(out[j * columns + i] == doctest::Approx(expected[j * columns + i]).scale(0).epsilon(1e-13));
@@ -357,7 +357,7 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     for (const int known : {0, 5, 12, columns}) {
       std::vector<double> again(columns * columns, 0.0);
       f->gram_add(c.data(), length, columns, known, length, acc.data());
-      f->gram_reduce(acc.data(), columns, again.data());
+      f->gram_reduce(acc.data(), columns, known, again.data());
       for (int j = known; j < columns; ++j) {
         for (int i = 0; i <= j; ++i) CHECK(again[j * columns + i] == out[j * columns + i]);
       }
@@ -368,7 +368,7 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
     std::vector<const double*> places;
     for (int k = 0; k < columns; ++k) places.push_back(some.data() + k * length);
     f->gram_add_columns(places.data(), columns, 0, length, acc.data());
-    f->gram_reduce(acc.data(), columns, placed.data());
+    f->gram_reduce(acc.data(), columns, 0, placed.data());
     const auto is_nought = [](int k) { return k >= 4 && k < 12; };
     for (int j = 0; j < columns; ++j) {
       for (int i = 0; i <= j; ++i)
