@@ -37,6 +37,7 @@ BAND = 2  # standard errors
 BAR = 120  # [px] of a cause that removes all of it
 AXIS = ("standard", "named")  # models that the axis of errors is for; others may be far off
 HEADROOM = 1.6  # of that axis over their largest error
+LITTLE = 0.95  # of an error: one that is closer to it is the same
 _EXACT = 1e-9  # [%] no error is smaller
 EMPTY_BIN = 0.005  # of a joint's rows: parts of the motion with fewer say nothing
 READ_OTHERWISE = (
@@ -518,12 +519,11 @@ def _error_card(page: Page, result: Mapping[str, Any]) -> None:
 
 
 def in_motion_sentence(result: Mapping[str, Any]) -> str:
-    """What named effects leave where a joint moves; "" where rests make no difference."""
+    """What named effects leave where a joint moves; "" where rests make little difference."""
     errors, moving = (result["torque"].get(rows, {}).get("named", {}) for rows in ("held_out", "in_motion"))
-    texts = {joint: (_percent(errors[joint]), _percent(moving.get(joint))) for joint in errors}
-    if all(one in (other, "–") for other, one in texts.values()):
+    if not any((moving.get(joint) or math.inf) < LITTLE * (errors[joint] or 0.0) for joint in errors):
         return ""
-    listed = ", ".join(f"{joint} {one}" for joint, (_, one) in texts.items())
+    listed = ", ".join(f"{joint} {_percent(moving.get(joint))}" for joint in errors)
     return (
         "Rows at rest are counted, where friction is what earlier motion left, and a recording that begins"
         f" at rest does not show that motion. Where the joint moves, named effects leave {listed}."

@@ -18,7 +18,7 @@ import truing
 from pages import charts_of, visible
 from truing.cli.commands.dynamics.diagnose import cause_lines
 from truing.dynamics import Recording, RecordingFinding, TorqueDiagnosis, diagnose, identify, predict
-from truing.dynamics.page import ROOM, causes_in_words
+from truing.dynamics.page import ROOM, causes_in_words, in_motion_sentence
 from truing.dynamics.result import (
     diagnosis_page,
     prediction_columns,
@@ -290,3 +290,12 @@ def test_the_headline_holds_in_two_lines_whatever_joints_are_called() -> None:
     assert said == "friction that grows with the load (2 joints); inertia of the motor's rotor (3 joints)"
     reversal = cause("presliding", names[2], 0.05, "Friction that builds up after a reversal")
     assert len(causes_in_words({"effects": [*load, *rotors, reversal]})) <= ROOM
+
+
+def test_errors_in_motion_are_said_where_rests_make_a_difference() -> None:
+    def said(held_out: float | None, in_motion: float | None) -> str:
+        errors = {"held_out": held_out, "in_motion": in_motion}
+        return in_motion_sentence({"torque": {rows: {"named": {"J1": e}} for rows, e in errors.items()}})
+
+    assert "named effects leave J1 5.1" in said(6.0, 5.1)
+    assert said(2.0, 1.95) == said(None, None) == ""
