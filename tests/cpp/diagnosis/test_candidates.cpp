@@ -11,6 +11,7 @@
 
 #include "diagnosis/design.hpp"
 #include "diagnosis/inputs.hpp"
+#include "diagnosis/linearise.hpp"
 #include "support/arms.hpp"
 
 namespace {
@@ -146,6 +147,17 @@ TEST_CASE("an own effect is found at its joint and drawn over the input that dri
   }
 }
 
+/// Columns of all rows where a robot stands at `at`.
+truing::diagnosis::Design design_at(const Robot& nominal, const Robot& at, const truing::Measurements& data) {
+  const std::vector<truing::diagnosis::InputColumn> inputs =
+      truing::diagnosis::make_inputs(truing::diagnosis::links_as_drawn(at, nominal), data);
+  std::vector<std::int32_t> rows(data.rows);
+  std::iota(rows.begin(), rows.end(), 0);
+  const std::vector<std::int8_t> set(rows.size(), 0);
+  const DiagnoseOptions options;
+  return truing::diagnosis::make_design({nominal, at, {}, data, inputs, rows, set, rows, options});
+}
+
 }  // namespace
 
 TEST_CASE("a weight that hardly loads a joint is not thought larger for it than machines are") {
@@ -154,13 +166,7 @@ TEST_CASE("a weight that hardly loads a joint is not thought larger for it than 
   Robot at = nominal;
   at.joints[2].alpha += 0.01;  // but for bars that are not quite parallel
   const auto table = a_table(nominal, 60, 31);
-  const std::vector<truing::diagnosis::InputColumn> inputs = truing::diagnosis::make_inputs(at, table->data);
-  std::vector<std::int32_t> rows(table->data.rows);
-  std::iota(rows.begin(), rows.end(), 0);
-  const std::vector<std::int8_t> set(rows.size(), 0);
-  const DiagnoseOptions options;
-  const truing::diagnosis::Design design =
-      truing::diagnosis::make_design({nominal, at, {}, table->data, inputs, rows, set, rows, options});
+  const truing::diagnosis::Design design = design_at(nominal, at, table->data);
   const auto size_of = [&](const std::string& moment) {
     const int column = design.column("gravity_moment.J2." + moment);
     REQUIRE(column >= 0);
@@ -180,13 +186,7 @@ TEST_CASE("a balanced joint has no side, though the last link is a little off wh
   Robot at = nominal;
   at.joints[3].a += 1e-3;  // which the data cannot tell from the tool
   const auto table = a_table(nominal, 60, 41);
-  const std::vector<truing::diagnosis::InputColumn> inputs = truing::diagnosis::make_inputs(nominal, table->data);
-  std::vector<std::int32_t> rows(table->data.rows);
-  std::iota(rows.begin(), rows.end(), 0);
-  const std::vector<std::int8_t> set(rows.size(), 0);
-  const DiagnoseOptions options;
-  const truing::diagnosis::Design design =
-      truing::diagnosis::make_design({nominal, at, {}, table->data, inputs, rows, set, rows, options});
+  const truing::diagnosis::Design design = design_at(nominal, at, table->data);
   const auto moves_the_tip = [&](const std::string& name) {
     const int column = design.column(name);
     REQUIRE(column >= 0);
