@@ -240,6 +240,7 @@ void question_bundles(Work* work, const Robot& robot, Decision* decision) {
     const Evidence::State rest = evidence.evaluate(without_these(decision->state.choice, bundle.groups));
     const double by_names = decision->state.score - rest.score;
     FreeScanOptions options;
+    options.threads = work->given.options.threads;
     options.flips = 0;
     if (!bundle.of_two) options.only_of = bundle.inputs;
     const FreeScan scan =

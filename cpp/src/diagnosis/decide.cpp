@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "diagnosis/free_search.hpp"
@@ -333,15 +334,20 @@ static bool is_smooth_turn(const Work& work, const Evidence& evidence, const Evi
          is_smooth(work, evidence, rest, q.joint, angle);
 }
 
+/// What a function looks like.
+struct Looks {
+  double of_shape;  ///< of it, what a step, a corner or a bump makes
+  bool smooth;      ///< it turns its joint in waves
+};
+
 /// The law that makes most of what the function and the laws at its joint make together; no group: none makes enough.
 static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence, const Choice& choice,
                                       const Question& q) {
   const auto& groups = work.design.candidates.groups;
   const auto& named = work.design.candidates.named;
   const Evidence::State rest = evidence.evaluate(without_these(choice, q.here));
-  const double of_shape = share_of_shape(work, evidence, rest, q);
+  std::optional<Looks> looks;  // found where a law makes enough for it to matter
   const bool of_angle = q.what.inputs[0] == input_named(work, input_name(Driver::angle, q.joint));
-  const bool smooth = is_smooth_turn(work, evidence, rest, q);
   const double together = rest.rss - evidence.evaluate(choice).rss;
   Evidence::Gain best;
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -353,12 +359,13 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
     const Evidence::Gain gain = evidence.gain(rest, groups[g].columns, groups[g].cost);
     const double share = gain.squares / std::max(together, 1e-300);
     const EffectTraits& traits = effect_traits(work, e);
+    if (!(gain.score > best.score && share > least_share_of_law(traits, true))) continue;
+    if (!looks) looks = {share_of_shape(work, evidence, rest, q), is_smooth_turn(work, evidence, rest, q)};
     const bool is_of_it = of_angle ? follows_configuration(traits) : follows_own_angle(traits);
-    const bool plainer = is_of_it && !smooth && share < kWholly && of_shape > kWholly;
-    if (!plainer && share > least_share_of_law(traits, smooth) && gain.score > best.score) {
-      best = gain;
-      best.group = static_cast<int>(g);
-    }
+    const bool plainer = is_of_it && !looks->smooth && share < kWholly && looks->of_shape > kWholly;
+    if (plainer || !(share > least_share_of_law(traits, looks->smooth))) continue;
+    best = gain;
+    best.group = static_cast<int>(g);
   }
   return best;
 }
@@ -707,6 +714,7 @@ static std::uint64_t add_what_is_unnamed(Work* work, const Robot& robot, std::ui
   for (int round = 0; round < kMostRounds; ++round) {
     const Evidence evidence = evidence_now(*work);
     FreeScanOptions scan_options;
+    scan_options.threads = work->given.options.threads;
     scan_options.seed = seed++;
     const FreeScan scan =
         scan_free(work->design, evidence, out->state, work->inputs, robot, work->noise.design_effect, scan_options);
@@ -726,6 +734,7 @@ static Decision explain(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
   Decision out;
   out.search.most_groups = options.max_effects;
+  out.search.threads = options.threads;
   Gears gears(work, robot);
   find_gap(*work, &gears, &out);
   if (work->given.mistaken) {

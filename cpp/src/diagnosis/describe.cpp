@@ -477,6 +477,7 @@ static std::string other_places(const Work& work, const Evidence& evidence, cons
   constexpr int kPlain = 8;  ///< parameters: more explain much of any motion
   const Explanation& mine = work.design.candidates.named[static_cast<std::size_t>(group)];
   FreeScanOptions options;
+  options.threads = work.given.options.threads;
   options.flips = 0;
   const FreeScan scan =
       scan_free(work.design, evidence, less, work.inputs, work.given.frames.robot, work.noise.design_effect, options);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "math/batch.hpp"
 #include "math/constants.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/random.hpp"
@@ -20,18 +21,19 @@ Left what_is_left(const Design& design, const Evidence::State& state, std::size_
   out.at = some.at;
   out.share = static_cast<double>(some.at.size()) / static_cast<double>(std::max<std::size_t>(1, some.of));
   const auto p = static_cast<Eigen::Index>(state.columns.size());
-  out.columns.resize(static_cast<Eigen::Index>(out.at.size()), p);
-  out.residual.resize(out.columns.rows());
-  for (Eigen::Index k = 0; k < out.columns.rows(); ++k) {
+  out.span.resize(static_cast<Eigen::Index>(out.at.size()), p);
+  out.residual.resize(out.span.rows());
+  for (Eigen::Index k = 0; k < out.span.rows(); ++k) {
     const Eigen::Index i = out.at[static_cast<std::size_t>(k)];
     for (Eigen::Index c = 0; c < p; ++c)
-      out.columns(k, c) = design.weight[i] * design.x(i, state.columns[static_cast<std::size_t>(c)]);
+      out.span(k, c) = design.weight[i] * design.x(i, state.columns[static_cast<std::size_t>(c)]);
     out.residual[k] = design.weight[i] * design.y[i];
   }
-  Eigen::MatrixXd d = out.columns.transpose() * out.columns;
+  Eigen::MatrixXd d = Eigen::MatrixXd::Zero(p, p);
+  d.selfadjointView<Eigen::Lower>().rankUpdate(out.span.transpose());
   d.diagonal() += state.precision * out.share + 1e-12 * d.diagonal();
-  out.factor = factorised(std::move(d));
-  out.residual -= out.columns * out.factor.solve(out.columns.transpose() * out.residual);
+  factorised(std::move(d)).matrixU().solveInPlace<Eigen::OnTheRight>(out.span);
+  out.residual -= out.span * (out.span.transpose() * out.residual);
   return out;
 }
 
@@ -274,50 +276,65 @@ std::vector<std::int32_t> distinct(std::vector<std::int32_t> values) {
   return values;
 }
 
-/// Slots of the right-hand sides: state's columns, the residual, then sign-flipped residuals.
+/// Slots of the right-hand sides: what the state spans, the residual, then sign-flipped residuals.
 Design::Rows right_sides(const Design& design, const Left& left, int flips, std::uint64_t seed) {
-  const Eigen::Index p = left.columns.cols();
-  Design::Rows out(left.columns.rows(), p + 1 + flips);
-  out.leftCols(p) = left.columns;
+  const Eigen::Index p = left.span.cols();
+  Design::Rows out(left.span.rows(), p + 1 + flips);
+  out.leftCols(p) = left.span;
   out.col(p) = left.residual;
   Random random(seed);
   const std::vector<std::int32_t> clusters = clusters_of(design, left.at), known = distinct(clusters);
-  for (int f = 0; f < flips; ++f) {
+  Eigen::MatrixXd flipped(left.residual.size(), flips);
+  for (Eigen::Index f = 0; f < flipped.cols(); ++f) {
     std::vector<double> sign(known.size());
     for (double& s : sign) s = random.next() & 1u ? 1.0 : -1.0;
-    Eigen::VectorXd flipped(left.residual.size());
-    for (Eigen::Index n = 0; n < flipped.size(); ++n) {
+    for (Eigen::Index n = 0; n < flipped.rows(); ++n) {
       const auto c =
           std::lower_bound(known.begin(), known.end(), clusters[static_cast<std::size_t>(n)]) - known.begin();
-      flipped[n] = sign[static_cast<std::size_t>(c)] * left.residual[n];
+      flipped(n, f) = sign[static_cast<std::size_t>(c)] * left.residual[n];
     }
-    // A fit would have taken its share of this noise, too.
-    flipped -= left.columns * left.factor.solve(left.columns.transpose() * flipped);
-    // Projected twice, it has become shorter than what it is compared with.
-    out.col(p + 1 + f) = flipped * (left.residual.norm() / std::max(flipped.norm(), 1e-300));
+  }
+  // A fit would have taken its share of this noise, too.
+  flipped -= left.span * (left.span.transpose() * flipped);
+  // Projected twice, it has become shorter than what it is compared with.
+  for (Eigen::Index f = 0; f < flipped.cols(); ++f)
+    out.col(p + 1 + f) = flipped.col(f) * (left.residual.norm() / std::max(flipped.col(f).norm(), 1e-300));
+  return out;
+}
+
+constexpr std::size_t kTrialsAtATime = 4;                 ///< that a thread takes
+constexpr double kScalesOfChance[] = {0.1, 0.01, 0.001};  ///< of functions: the same for the data and for random signs
+
+/// Scores of residuals, each the largest of any scale. `seen`: X^T v of each; `a`: X^T X beyond the state.
+std::vector<double> scores_of(const Evidence& evidence, const Evidence::State& state, const Eigen::MatrixXd& a,
+                              const Eigen::MatrixXd& seen, double cost) {
+  std::vector<double> out(static_cast<std::size_t>(seen.cols()), -1e300);
+  for (const double scale : kScalesOfChance) {
+    Eigen::MatrixXd m = a;
+    const double ridge = state.sigma2 / std::pow(scale * kLargest, 2.0);
+    m.diagonal().array() += ridge;
+    const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
+    const double determinants =
+        static_cast<double>(a.rows()) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+    Eigen::MatrixXd half = seen;
+    factor.matrixL().solveInPlace(half);
+    for (std::size_t f = 0; f < out.size(); ++f) {
+      const double fall = std::min(half.col(static_cast<Eigen::Index>(f)).squaredNorm(), 0.999 * state.rss);
+      const double score =
+          -0.5 * evidence.degrees_of_freedom() * std::log1p(-fall / state.rss) + 0.5 * determinants - cost;
+      out[f] = std::max(out[f], score);
+    }
   }
   return out;
 }
 
-constexpr double kScalesOfChance[] = {0.1, 0.01, 0.001};  ///< of functions: the same for the data and for random signs
-
-/// Scores of residuals, each the largest of those so far. `seen`: X^T v of each; `a`: X^T X beyond the state.
-void raise_scores(const Evidence& evidence, const Evidence::State& state, const Eigen::MatrixXd& a,
-                  const Eigen::MatrixXd& seen, double scale, double cost, std::vector<double>* largest) {
-  Eigen::MatrixXd m = a;
-  const double ridge = state.sigma2 / std::pow(scale * kLargest, 2.0);
-  m.diagonal().array() += ridge;
-  const Eigen::LLT<Eigen::MatrixXd> factor = factorised(std::move(m));
-  const double determinants =
-      static_cast<double>(a.rows()) * std::log(ridge) - 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-  Eigen::MatrixXd half = seen;
-  factor.matrixL().solveInPlace(half);
-  for (std::size_t f = 0; f < largest->size(); ++f) {
-    const double fall = std::min(half.col(static_cast<Eigen::Index>(f)).squaredNorm(), 0.999 * state.rss);
-    const double score =
-        -0.5 * evidence.degrees_of_freedom() * std::log1p(-fall / state.rss) + 0.5 * determinants - cost;
-    (*largest)[f] = std::max((*largest)[f], score);
+/// Of every column the largest.
+std::vector<double> largest_of(const std::vector<std::vector<double>>& scores) {
+  std::vector<double> out = scores[0];
+  for (const std::vector<double>& of_one : scores) {
+    for (std::size_t f = 0; f < out.size(); ++f) out[f] = std::max(out[f], of_one[f]);
   }
+  return out;
 }
 
 /// How often a score is as high as the first, which is the data's own: that one counted in, this is uniform for noise.
@@ -334,37 +351,37 @@ FreeScan scan_free(const Design& design, const Evidence& evidence, const Evidenc
   const Left left = what_is_left(design, state, options.most_values);
   const std::vector<Trial> trials =
       TrialMaker(design, inputs, distinct(clusters_of(design, left.at)).size(), options.only_of).run(robot);
-  const Eigen::Index p = left.columns.cols();
+  const Eigen::Index p = left.span.cols();
   const Design::Rows right = right_sides(design, left, options.flips, options.seed);
   const double times = 1.0 / (left.share * design_effect);
   const Evidence::State seen = seen_on(left, evidence, state, times);
-  FreeScan out;
-  out.tried = trials.size();
-  std::vector<double> largest(static_cast<std::size_t>(options.flips) + 1, -1e300);  // the data's own first
-  const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, out.tried)));
+  const double cost = std::log(static_cast<double>(std::max<std::size_t>(1, trials.size())));
   std::map<std::vector<int>, SiteView> views;  // by the columns that a function moves
   for (const Trial& trial : trials) {
-    auto view = views.find(trial.sites);
-    if (view == views.end()) view = views.emplace(trial.sites, view_of(trial.sites, design, left.at, right)).first;
-    const Sums sums = sums_of(trial, inputs, view->second);
-    const Eigen::Index k = sums.xx.rows();
-    const Eigen::MatrixXd c = sums.right.leftCols(p);
-    const Eigen::MatrixXd half = left.factor.matrixL().solve(c.transpose());
-    Eigen::MatrixXd a = (sums.xx - half.transpose() * half) * times;
-    for (Eigen::Index i = 0; i < k; ++i) a(i, i) += 1e-9 * sums.xx(i, i) * times;
-    FreeGain found;
-    found.gain = evidence.gain_of(seen, a, sums.right.col(p) * times, Eigen::VectorXd::Constant(k, kLargest), cost);
-    if (options.flips > 0) {
-      const Eigen::MatrixXd all = sums.right.rightCols(options.flips + 1) * times;
-      for (const double scale : kScalesOfChance) raise_scores(evidence, seen, a, all, scale, cost, &largest);
-    }
-    found.what = trial.what;
-    found.site_columns = trial.sites;
-    out.best.push_back(std::move(found));
+    if (views.count(trial.sites) == 0) views.emplace(trial.sites, view_of(trial.sites, design, left.at, right));
   }
+  FreeScan out;
+  out.tried = trials.size();
+  out.best.resize(trials.size());
+  std::vector<std::vector<double>> scores(trials.size());  // of a trial: the data's own, then those of the flips
+  math::for_each_on_threads(
+      trials.size(), options.threads, {},
+      [&](std::size_t at) {
+        const Trial& trial = trials[at];
+        const Sums sums = sums_of(trial, inputs, views.at(trial.sites));
+        const Eigen::Index k = sums.xx.rows();
+        const auto spanned = sums.right.leftCols(p);
+        Eigen::MatrixXd a = (sums.xx - spanned * spanned.transpose()) * times;
+        a.diagonal() += 1e-9 * times * sums.xx.diagonal();
+        const Eigen::VectorXd prior = Eigen::VectorXd::Constant(k, kLargest);
+        out.best[at] = {trial.what, trial.sites, evidence.gain_of(seen, a, sums.right.col(p) * times, prior, cost)};
+        if (options.flips > 0)
+          scores[at] = scores_of(evidence, seen, a, sums.right.rightCols(options.flips + 1) * times, cost);
+      },
+      kTrialsAtATime);
+  if (!trials.empty() && options.flips > 0) out.p = chance_of(largest_of(scores));
   std::sort(out.best.begin(), out.best.end(),
             [](const FreeGain& a, const FreeGain& b) { return a.gain.score > b.gain.score; });
-  if (!out.best.empty() && options.flips > 0) out.p = chance_of(largest);
   if (out.best.size() > 200) out.best.resize(200);
   return out;
 }

@@ -22,13 +22,13 @@ struct SomeRows {
 /// Of more than `most` values, whole folds are left out.
 SomeRows some_training_rows(const Design& design, std::size_t most);
 
-/// The rows that are looked at, weighted, with what the state's columns are on them.
+/// The rows that are looked at, weighted, and what a state leaves of them. Of any values v on them it leaves
+/// v - span span^T v: span = C L^-T of its weighted columns C, with L L^T = C^T C and its prior.
 struct Left {
   std::vector<Eigen::Index> at;  ///< rows of the design
-  Eigen::MatrixXd columns;       ///< weighted columns of the state, shape (rows, columns)
-  Eigen::VectorXd residual;      ///< weighted
-  Eigen::LLT<Eigen::MatrixXd> factor;
-  double share = 1.0;  ///< of the training rows
+  Eigen::MatrixXd span;          ///< shape (rows, columns of the state)
+  Eigen::VectorXd residual;      ///< of the measured values, weighted
+  double share = 1.0;            ///< of the training rows
 };
 
 /// Of more than `most` training values, whole folds are left out.
@@ -56,6 +56,7 @@ struct FreeScanOptions {
   std::uint64_t seed = 0;
   std::size_t most_values = 20000;  ///< measured values looked at: of more, whole folds are left out
   std::vector<int> only_of{};       ///< inputs: functions of one of them alone are tried; empty: everything is
+  int threads = 1;                  ///< 0: as many as the machine has; nothing depends on it
 };
 
 /// Scores free functions on what `state` leaves of the training rows. `design_effect`: values that count as one.

@@ -165,7 +165,8 @@ Gears::Gears(Work* work, const Robot& robot)
 OrderAt Gears::best(const Evidence& evidence, const Evidence::State& state) {
   if (!wanted_) return {};
   keep_what_is_in(state);
-  return OrderScan(work_->design, evidence, state, work_->inputs, work_->samplings, work_->noise.design_effect)
+  return OrderScan(work_->design, evidence, state, work_->inputs, work_->samplings, work_->noise.design_effect,
+                   work_->given.options.threads)
       .best(known_, passed_over_);
 }
 
@@ -317,7 +318,7 @@ void Gears::choose_orders_again(Decision* decision) {
     std::vector<OrderAt> others = known_;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
     const OrderScan scan(work_->design, evidence, evidence.evaluate(rest), work_->inputs, work_->samplings,
-                         work_->noise.design_effect);
+                         work_->noise.design_effect, work_->given.options.threads);
     const OrderAt other = scan.again(known_[k], others);
     if (std::abs(other.order - known_[k].order) < 1e-9) continue;
     const std::size_t before = groups.size();

@@ -79,10 +79,10 @@ class Beside {
       values(x_[static_cast<std::size_t>(n)], at.data());
       columns.row(n) = motion_[n] * at;
     }
-    const Eigen::MatrixXd half = left_.factor.matrixL().solve(left_.columns.transpose() * columns);
+    const Eigen::MatrixXd spanned = left_.span.transpose() * columns;
     Eigen::MatrixXd a = columns.transpose() * columns;
     const Eigen::VectorXd own = 1e-9 * a.diagonal();
-    a -= half.transpose() * half;
+    a -= spanned.transpose() * spanned;
     a.diagonal() += own;
     const Eigen::VectorXd b = columns.transpose() * left_.residual;
     return evidence_.gain_of(seen_, times_ * a, times_ * b, Eigen::VectorXd::Constant(p, kLargest), 0.0).evidence;

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <memory>
 
+#include "math/batch.hpp"
 #include "math/constants.hpp"
 #include "math/random.hpp"
 #include "math/statistics.hpp"
@@ -88,8 +89,8 @@ std::vector<double> backgrounds(const std::vector<Wave>& waves, double sigma2, d
 class JointView {
  public:
   JointView(const Design& design, const Left& left, const InputColumn& input, std::size_t joint, double times)
-      : factor_(left.factor), times_(times) {
-    const auto p = left.columns.cols();
+      : times_(times) {
+    const auto p = left.span.cols();
     const auto [angle, row_of] = angles_of(design, left, input);
     angle_ = Eigen::Map<const Eigen::ArrayXd>(angle.data(), static_cast<Eigen::Index>(angle.size()));
     right_.setZero(angle_.size(), p + 1);
@@ -97,7 +98,7 @@ class JointView {
     for (std::size_t n = 0; n < left.at.size(); ++n) {
       const Eigen::Index i = left.at[n], row = row_of[n], at = static_cast<Eigen::Index>(n);
       const double d = design.weight[i] * design.x(i, design.joint_column[joint][0]);
-      right_.row(row).head(p) += d * left.columns.row(at);
+      right_.row(row).head(p) += d * left.span.row(at);
       right_(row, p) += d * left.residual[at];
       squares_[row] += d * d;
     }
@@ -124,21 +125,19 @@ class JointView {
       s = s * cos_step + c * sin_step;
       c = next;
     }
-    const Eigen::MatrixXd sums = waves.transpose() * right_;
-    Eigen::MatrixXd half = sums.leftCols(p).transpose();
-    factor_.matrixL().solveInPlace(half);
+    const Eigen::MatrixXd sums = right_.transpose() * waves;
     const double all = squares_.sum();
     for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(count); ++k) {
       const auto cosine = waves.col(2 * k).array(), sine = waves.col(2 * k + 1).array();
       const double cc = (cosine.square() * squares_).sum(), cs = (cosine * sine * squares_).sum();
-      const auto u = half.col(2 * k), v = half.col(2 * k + 1);
+      const auto u = sums.col(2 * k).head(p), v = sums.col(2 * k + 1).head(p);
       const double seen = all - u.squaredNorm() - v.squaredNorm();
       if (!(seen > kInvisible * all)) {
         out->emplace_back();
         continue;
       }
       out->push_back({times_ * (cc - u.squaredNorm()), times_ * (cs - u.dot(v)), times_ * (all - cc - v.squaredNorm()),
-                      times_ * sums(2 * k, p), times_ * sums(2 * k + 1, p)});
+                      times_ * sums(p, 2 * k), times_ * sums(p, 2 * k + 1)});
     }
   }
 
@@ -158,10 +157,9 @@ class JointView {
     return out;
   }
 
-  Eigen::LLT<Eigen::MatrixXd> factor_;
   double times_;  ///< a value counts for
   Eigen::ArrayXd angle_;
-  Eigen::MatrixXd right_;   ///< the state's columns and the residual, times the joint's column: a row each
+  Eigen::MatrixXd right_;   ///< what the state spans and the residual, times the joint's column: a row each
   Eigen::ArrayXd squares_;  ///< of the joint's column
 };
 
@@ -242,7 +240,7 @@ std::vector<Sampling> samplings(const Design& design, const std::vector<InputCol
 
 OrderScan::OrderScan(const Design& design, const Evidence& evidence, const Evidence::State& state,
                      const std::vector<InputColumn>& inputs, const std::vector<Sampling>& samplings,
-                     double design_effect, std::size_t most_values) {
+                     double design_effect, int threads, std::size_t most_values) {
   double travel = 0.0;
   for (const Sampling& sampling : samplings) {
     if (is_scanned(sampling)) travel = std::max(travel, sampling.travel);
@@ -257,13 +255,15 @@ OrderScan::OrderScan(const Design& design, const Evidence& evidence, const Evide
   const Evidence::State seen = seen_on(left, evidence, state, times);
   const double freedom = evidence.degrees_of_freedom();
   for (const Sampling& sampling : samplings) {
-    if (!is_scanned(sampling)) continue;
+    if (is_scanned(sampling)) joints_.push_back({sampling, {}, {}, {}});
+  }
+  const auto scan = [&](std::size_t j) {
+    AtJoint& one = joints_[j];
+    const Sampling& sampling = one.sampling;
     const auto view = std::make_shared<const JointView>(design, left, *motion_of_joint(inputs, sampling.joint),
                                                         sampling.joint, times);
     const std::vector<Wave> waves = view->waves(orders_[0], step, orders_.size());
     const std::vector<double> background = backgrounds(waves, seen.sigma2, step, width_of(sampling));
-    AtJoint one;
-    one.sampling = sampling;
     for (std::size_t k = 0; k < waves.size(); ++k) {
       one.nats.push_back(nats_of(waves[k], seen, freedom, background[k]));
       one.in_noise.push_back(nats_of(waves[k], seen, freedom, 1.0));
@@ -276,8 +276,8 @@ OrderScan::OrderScan(const Design& design, const Evidence& evidence, const Evide
       return nats;
     };
     for (std::size_t k = 0; k < orders_.size() && orders_[k] < sampling.lowest; ++k) one.nats[k] = 0.0;
-    joints_.push_back(std::move(one));
-  }
+  };
+  math::for_each_on_threads(joints_.size(), threads, {}, scan, 1);
 }
 
 double OrderScan::chance_of(const OrderAt& order) {

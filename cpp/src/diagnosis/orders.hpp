@@ -60,7 +60,7 @@ class OrderScan {
 
   OrderScan(const Design& design, const Evidence& evidence, const Evidence::State& state,
             const std::vector<InputColumn>& inputs, const std::vector<Sampling>& samplings, double design_effect,
-            std::size_t most_values = 20000);
+            int threads, std::size_t most_values = 20000);
 
   /// The most probable order at one joint, or at several together. Those `known` are in the state: the same at further
   /// joints, and what the same gear makes beside, are then as probable as all others. No joints: nothing was scanned.

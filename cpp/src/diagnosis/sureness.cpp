@@ -252,6 +252,7 @@ static double as_lagging_warmth(const Work& work, const Evidence& evidence, cons
     best = std::max(best, evidence.gain(rest, of_all_links, 0.0).evidence);
   if (time.empty()) return best;
   FreeScanOptions of_time;
+  of_time.threads = work.given.options.threads;
   of_time.flips = 0;
   of_time.only_of = time;
   const Robot& robot = work.given.frames.robot;
@@ -418,6 +419,7 @@ static std::vector<std::vector<int>> select_again(const Work& work, const Decisi
   constexpr int kSelections = 10;
   SearchOptions quick = decision.search;
   quick.beam = 1;
+  quick.threads = 1;  // draws are side by side
   const Shortlist list = shortlist(work, decision.state.choice.groups);
   const std::vector<Gram> folds = of_columns(work.grams.train_folds, list.columns);
   std::vector<Gram> draws;

@@ -129,24 +129,24 @@ Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d) {
 
 namespace {
 
-/// So many columns of L^-1 at a time.
-constexpr Eigen::Index kInverseBlock = 64;
+/// So many columns at a time.
+constexpr Eigen::Index kBlock = 64;
 
 /// Calls work(first, count) for blocks of columns.
 template <typename Work>
-void for_inverse_blocks(Eigen::Index n, int threads, const Work& work) {
+void for_blocks(Eigen::Index n, int threads, const Work& work) {
   const auto one = [&](std::size_t block) {
-    const Eigen::Index first = static_cast<Eigen::Index>(block) * kInverseBlock;
-    work(first, std::min(kInverseBlock, n - first));
+    const Eigen::Index first = static_cast<Eigen::Index>(block) * kBlock;
+    work(first, std::min(kBlock, n - first));
   };
-  for_each_on_threads(static_cast<std::size_t>((n + kInverseBlock - 1) / kInverseBlock), threads, {}, one, 1);
+  for_each_on_threads(static_cast<std::size_t>((n + kBlock - 1) / kBlock), threads, {}, one, 1);
 }
 
 /// L^-1, by blocks of columns, which are zero above the diagonal.
 Eigen::MatrixXd inverse_of_lower(const Eigen::MatrixXd& L, int threads) {
   const Eigen::Index n = L.rows();
   Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n, n);
-  for_inverse_blocks(n, threads, [&](Eigen::Index first, Eigen::Index count) {
+  for_blocks(n, threads, [&](Eigen::Index first, Eigen::Index count) {
     auto columns = out.block(first, first, n - first, count);
     L.bottomRightCorner(n - first, n - first).triangularView<Eigen::Lower>().solveInPlace(columns);
   });
@@ -160,7 +160,7 @@ Eigen::MatrixXd upper_inverse(const Eigen::LLT<Eigen::MatrixXd>& factor, int thr
   const Eigen::MatrixXd half = inverse_of_lower(factor.matrixLLT(), threads);
   const Eigen::Index n = half.rows();
   Eigen::MatrixXd out(n, n);
-  for_inverse_blocks(n, threads, [&](Eigen::Index first, Eigen::Index count) {
+  for_blocks(n, threads, [&](Eigen::Index first, Eigen::Index count) {
     const Eigen::Index below = n - first, last = first + count;
     out.block(0, first, last, count).noalias() =
         half.block(first, 0, below, last).transpose() * half.block(first, first, below, count);
@@ -340,7 +340,7 @@ struct Evidence::Projected {
   Eigen::VectorXd u;  ///< L^-1 X_S^T y
 };
 
-Evidence::Projected Evidence::project(const State& state) const {
+Evidence::Projected Evidence::project(const State& state, int threads) const {
   Projected out;
   const std::vector<int> own = factored(state);
   out.v.resize(static_cast<Eigen::Index>(own.size()), gram_.xx.cols());
@@ -351,7 +351,10 @@ Evidence::Projected Evidence::project(const State& state) const {
     else
       out.v.row(i) = rest_row(column).transpose();
   }
-  state.factor.matrixL().solveInPlace(out.v);
+  for_blocks(out.v.cols(), threads, [&](Eigen::Index first, Eigen::Index count) {
+    auto block = out.v.middleCols(first, count);
+    state.factor.matrixL().solveInPlace(block);
+  });
   out.u = state.factor.matrixL().solve(rest(own));
   return out;
 }
@@ -435,10 +438,12 @@ std::function<double(const std::vector<int>&)> Evidence::explained(const State& 
   };
 }
 
-std::vector<Evidence::Gain> Evidence::gains(const State& state) const {
-  const Projected projected = project(state);
+std::vector<Evidence::Gain> Evidence::gains(const State& state, int threads) const {
+  constexpr std::size_t kGroupsAtATime = 16;
+  if (eliminated_ > 0) threads = 1;
+  const Projected projected = project(state, threads);
   std::vector<Gain> out(groups_.size());
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
+  const auto one = [&](std::size_t g) {
     const std::vector<int>& columns = groups_[g].columns;
     Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
     for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
@@ -450,7 +455,8 @@ std::vector<Evidence::Gain> Evidence::gains(const State& state) const {
       const auto i = static_cast<Eigen::Index>(k);
       out[g].rank += a(i, i) > 1e-7 * gram_.xx(columns[k], columns[k]) ? 1 : 0;
     }
-  }
+  };
+  for_each_on_threads(groups_.size(), threads, {}, one, kGroupsAtATime);
   return out;
 }
 
@@ -491,7 +497,7 @@ Evidence::State Evidence::improve(State state, const SearchOptions& options) con
       }
       if (before - after > 1) continue;  // a law with its correction is not swapped
       Gain best;
-      for (const Gain& gain : gains(less)) {
+      for (const Gain& gain : gains(less, options.threads)) {
         if (may_enter(less, gain.group) && gain.group != state.choice.groups[at] && gain.score > best.score)
           best = gain;
       }
@@ -519,7 +525,7 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
     std::vector<State> next;
     for (const State& state : beam) {
       std::vector<Gain> ranked;
-      for (const Gain& gain : gains(state)) {
+      for (const Gain& gain : gains(state, options.threads)) {
         if (may_enter(state, gain.group) && gain.score > options.threshold && gain.share > options.least_share)
           ranked.push_back(gain);
       }

@@ -77,6 +77,7 @@ struct SearchOptions {
       0.75;  ///< a law's correction goes before a second effect if it wins at least this part of what that one would
   int beam = 3;
   int most_groups = 12;
+  int threads = 1;  ///< 0: as many as the machine has; nothing depends on it
 };
 
 /// A set of groups with the scale of each one's prior.
@@ -128,7 +129,7 @@ class Evidence {
     double squares = 0.0;      ///< fall of the sum of squares, plain least squares
     int rank = 0;              ///< columns that the data can see
   };
-  std::vector<Gain> gains(const State& state) const;
+  std::vector<Gain> gains(const State& state, int threads = 1) const;
 
   /// The same for columns outside the Gram: theirs (X^T X, X^T y) after projection on the state, and their priors.
   Gain gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& prior,
@@ -162,7 +163,7 @@ class Evidence {
 
  private:
   struct Projected;
-  Projected project(const State& state) const;
+  Projected project(const State& state, int threads = 1) const;
   /// Of the columns that State::factor is of.
   std::vector<int> factored(const State& state) const;
   /// What the eliminated columns leave of X^T X, of X^T y and of y^T y.
