@@ -289,13 +289,13 @@ static bool may_be_warmth(const Work& work, const Explanation& small, const Expl
 }
 
 /// Laws are seldom exact, and what one leaves looks like another one: the joint was not set to zero where the law says;
-/// where both go with the joint's own angle, little is left.
+/// where both move the same thing by the joint's own angle, little is left. A tilting axis leaves no turn about it.
 static bool is_departure(const Work& work, const Explanation& small, const Explanation& large, double ratio) {
   constexpr double kLittle = 0.3;  ///< of the larger law's motion of the tip
   const EffectTraits &one = effect_traits(work, small), &other = effect_traits(work, large);
   if (same_name(small, large) || small.joints != large.joints) return false;
   if (one.driver == Driver::constant && one.moves == other.moves) return true;
-  return follows_own_angle(one) && follows_own_angle(other) && ratio < kLittle;
+  return follows_own_angle(one) && follows_own_angle(other) && one.moves == other.moves && ratio < kLittle;
 }
 
 /// Of the names that may be what a law of the temperature leaves: those that are. They are asked together first, for

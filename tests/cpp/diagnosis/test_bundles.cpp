@@ -139,6 +139,16 @@ TEST_CASE("two laws of one joint's angle that are both there keep their names") 
   CHECK(is_named_at(d, "axis_wobble", "J3"));
 }
 
+TEST_CASE("an eccentric disc keeps its name beside a larger tilting axis of its joint: that leaves no turn about it") {
+  const Diagnosis d =
+      diagnosis_of({{"harmonic", {"J3"}, {{"harmonic.J3.cos1", 8e-5}, {"harmonic.J3.sin1", 6e-5}}},
+                    {"axis_wobble", {"J3"}, {{"axis_wobble.J3.cos_x", 1.2e-3}, {"axis_wobble.J3.sin_y", 1.2e-3}}}},
+                   50);
+  INFO(what_was_said(d));
+  CHECK(is_named_at(d, "harmonic", "J3"));
+  CHECK(is_named_at(d, "axis_wobble", "J3"));
+}
+
 TEST_CASE("a joint that carries another along and errs by itself keeps both names") {
   for (const unsigned seed : {60u, 70u}) {
     const Diagnosis d = diagnosis_of({{"neighbour_coupling", {"J2"}, {{"neighbour_coupling.J2.J3", 2e-4}}},
