@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 D, A, ALPHA, BETA = range(4)  # columns of Changes.links
+_NO_WEIGHT = 1e-6  # [Nm | N]: more than rounding, and than twenty bodies of a microgram 3 m away
 
 
 class NoRestError(Exception):
@@ -341,6 +342,11 @@ def gravity_torques(chain: Chain, state: Sweep, payload: Floats) -> Floats:
         for driver, weight in drivers:
             total[:, driver] += weight * single[:, j]
     return total
+
+
+def side_of(torque: Floats) -> Floats:
+    """-1 or 1: the side to which a torque [Nm] or force [N] pushes; 0 where nothing does."""
+    return np.asarray(np.where(np.abs(torque) > _NO_WEIGHT, np.sign(torque), 0.0))
 
 
 def _tool_points(chain: Chain, state: Sweep) -> Floats:

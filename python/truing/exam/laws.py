@@ -31,6 +31,7 @@ from truing.exam.kinematics import (
     gravity_torques,
     motions,
     no_changes,
+    side_of,
     sweep,
 )
 
@@ -208,7 +209,7 @@ def gravity_backlash(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     def values(c: Context) -> Floats:
         torque = c.torque[:, joint]
         if depart == 0.0:
-            return np.asarray(0.5 * np.sign(torque))
+            return 0.5 * side_of(torque)
         return np.asarray(0.5 * np.tanh(torque / (0.5 * depart * c.largest(joint))))
 
     return Hidden("gravity_backlash", (joint,), at_joint(joint, values), needs=frozenset({"masses"}))

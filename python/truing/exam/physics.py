@@ -36,6 +36,7 @@ from truing.exam.kinematics import (
     motions,
     no_changes,
     rotations,
+    side_of,
 )
 
 Spring = Callable[[Floats], Floats]
@@ -45,7 +46,7 @@ _BEAM_AT = (
     1 / 2,
     5 / 6,
 )  # midpoint rule: tip of a clamped beam under an end force to 3 %, under an end moment exactly
-_TINY = 1e-9  # mass and inertia of what has none [kg, kg m^2]
+_TINY = 1e-9  # mass and inertia of what has none [kg, kg m^2]: none of its weight moves a gap (`side_of`)
 _CONVERGED = 1e-13
 _SWEEPS = 60
 _PATIENCE = 30  # sweeps until a gap that keeps changing sides counts as afloat
@@ -56,7 +57,7 @@ class Play:
     """A gap between motor and joint, and the friction that holds the joint back while the motor moves in."""
 
     width: float  # [rad | m]
-    friction: float  # [Nm | N]; large: the approach decides the side, 0: the weight does
+    friction: float  # [Nm | N]; without bound: the approach decides the side, 0: the weight does
 
 
 @dataclass(frozen=True)
@@ -245,7 +246,7 @@ class Mechanism:
         """Moves every spring and gap to where the forces put it; the largest move.
 
         A joint balanced within its gap touches neither stop: it would go to and fro, and is left `afloat` in
-        the middle.
+        the middle. So is one that nothing weighs on.
         """
         moved = 0.0
         for j, hinge in self.springs.items():
@@ -256,7 +257,7 @@ class Mechanism:
         for j, hinge in self.plays.items():
             play = self.parts.plays[j]
             pushed = float(weight[hinge.dof]) - play.friction * float(direction[self.chain.driven.index(j)])
-            place = 0.5 * play.width * float(np.sign(pushed))
+            place = 0.5 * play.width * float(side_of(np.array(pushed)))
             if afloat and place != float(self.data.qpos[hinge.qpos]):
                 place = 0.0
             moved = max(moved, self._put(hinge, place))

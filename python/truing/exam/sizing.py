@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truing.exam import laws
-from truing.exam.kinematics import ALPHA, BETA, A, Changes, D, Floats, site_columns
+from truing.exam.kinematics import ALPHA, BETA, A, Changes, D, Floats, side_of, site_columns
 from truing.exam.laws import Context, Hidden
 
 SAME = 0.98
@@ -171,7 +171,7 @@ def _at_joint(context: Context, joint: int, handed: frozenset[str]) -> list[tupl
         torque = context.torque[:, joint]
         found.append(("joint_compliance", [_moving(context, joint, torque)]))
         found.append(("stiffness_zones", _zones(context, joint)))
-        found.append(("gravity_backlash", [_moving(context, joint, np.sign(torque))]))
+        found.append(("gravity_backlash", [_moving(context, joint, side_of(torque))]))
         if joint + 1 < chain.joints:
             found.append(
                 ("link_compliance", [laws.link_compliance(joint, np.random.default_rng(0)).changes(context)])

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -74,10 +75,8 @@ class Truth:
                     motor_torque(context, joint, effect.detail["friction"]) + context.torque[:, joint]
                 )
             elif effect.effect == "backlash":
-                # Friction holds the joint back; a loose one lets the weight decide where it is the stronger.
-                plays[joint] = Play(
-                    effect.size, (2.0 * largest + 1.0) * (1.0 - effect.detail.get("loose", 0.0))
-                )
+                # The approach decides the side, whatever weight the robot as made puts on the joint.
+                plays[joint] = Play(effect.size, math.inf)
             elif effect.effect == "gravity_backlash":
                 plays[joint] = Play(effect.size, 0.0)
             elif effect.effect == "link_compliance":

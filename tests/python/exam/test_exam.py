@@ -43,12 +43,23 @@ from truing.exam.answers import (
 )
 from truing.exam.builds import package_build
 from truing.exam.design import draw, usual_plan
-from truing.exam.kinematics import Chain, Floats, NoRestError, chain_of, gravity_torques, no_changes, sweep
+from truing.exam.kinematics import (
+    ALPHA,
+    Chain,
+    Changes,
+    Floats,
+    NoRestError,
+    chain_of,
+    gravity_torques,
+    no_changes,
+    side_of,
+    sweep,
+)
 from truing.exam.numbering import WHICH
 from truing.exam.physics import Mechanism, Parts, Play, link_frames
 from truing.exam.robots import Specimen, specimens
 from truing.exam.run import Statics, run_exam
-from truing.exam.scenes import NoSetError
+from truing.exam.scenes import NoSetError, make_scene, sensible
 from truing.exam.score import (
     LINES,
     MORE,
@@ -198,6 +209,47 @@ def test_friction_or_weight_decides_the_side_of_a_gap() -> None:
             0.3 - direction * width / 2, abs=1e-12
         )
         assert angle_of(chain, loose, [0.3], direction)[0] == pytest.approx(0.3 - width / 2, abs=1e-12)
+
+
+def test_the_approach_decides_a_gap_whatever_weighs_on_the_robot_as_made() -> None:
+    """Drawn upright, the first axis carries nothing; made 1 mrad off, the foundry's carries up to 2 Nm."""
+    specimen = next(specimen for _, specimen in EVERY if specimen.name == "foundry")
+    _, chain = placed(specimen)
+    inputs = some_inputs(specimen, chain)
+
+    def leaning(context: laws.Context) -> Changes:
+        changes = context.still()
+        changes.links[:, 0, ALPHA] = 1e-3
+        return changes
+
+    truth = Truth(specimen, chain, physics=True, geometry=leaning)
+    play = laws.backlash(0, np.random.default_rng(0)).sized(1e-3)
+    moved = truth.observe(inputs, [play])[0] - truth.observe(inputs, [])[0]
+    state = sweep(chain, inputs.readings, leaning(laws.Context(chain, inputs)), inputs.target)
+    turning = np.cross(state.joint_axis[0], state.tip - state.joint_origin[0])
+    angle = np.sum(moved * turning, axis=1) / np.sum(turning**2, axis=1)
+    assert angle == pytest.approx(-0.5e-3 * inputs.direction[:, 0], rel=1e-3)
+
+
+def test_a_mass_that_is_not_there_decides_no_side() -> None:
+    """An empty tool: MuJoCo's bodies cannot be without mass, numpy's sums round."""
+    chain, width = pendulum(mass=0.0), 2e-3
+    assert angle_of(chain, Parts(plays={0: Play(width, friction=0.0)}), [0.3])[0] == pytest.approx(
+        0.3, abs=1e-12
+    )
+    assert side_of(np.array([-1e-7, 0.0, 1e-7, -0.1, 0.1])).tolist() == [0.0, 0.0, 0.0, -1.0, 1.0]
+
+
+def test_no_axis_wobbles_more_than_the_catalogue_has_it() -> None:
+    for name, effect in (
+        ("axis_wobble", laws.axis_wobble(1, np.random.default_rng(0))),
+        ("axis_wobble_twice", machine_laws.wobble_twice(1, np.random.default_rng(0))),
+    ):
+        traits = next(each.traits for each in truing.model.catalogue_effects() if each.name == name)
+        scene = make_scene(sets.NUMBERING.request("development/single/0@1"), "departures")
+        tilt = np.abs(effect.changes(scene.context).tilt).max()
+        assert sensible(scene, effect.sized(0.99 * traits.plausible / tilt))
+        assert not sensible(scene, effect.sized(1.01 * traits.plausible / tilt))
 
 
 def test_a_gap_comes_to_rest_where_stepping_through_time_brings_it() -> None:
