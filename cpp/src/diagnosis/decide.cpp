@@ -773,13 +773,13 @@ Decision decide(Work* work, const Robot& robot) {
   for (;;) {
     Decision out = explain(work, robot);
     const std::vector<TooLarge> more = too_large_in(*work, out.state);
-    const std::vector<TooLarge> misshapen = out_of_proportion_in(*work, with_plain_laws(*work, out));
-    if (more.empty() && misshapen.empty()) {
+    std::vector<int> gone = out_of_proportion_in(*work, with_plain_laws(*work, out));
+    for (const TooLarge& one : more) gone.push_back(one.group);
+    if (gone.empty()) {
       out.too_large = std::move(aside);
       return out;
     }
-    set_aside(more, groups, grams, work);
-    set_aside(misshapen, groups, grams, work);
+    set_aside(gone, groups, grams, work);
     aside.insert(aside.end(), more.begin(), more.end());
   }
 }

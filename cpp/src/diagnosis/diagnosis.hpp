@@ -282,10 +282,10 @@ class Gears {
 
 /// Chosen effects of the catalogue that are, for sure, larger than plausible.
 std::vector<TooLarge> too_large_in(const Work& work, const Evidence::State& state);
-/// Chosen effects whose parts are, for sure, of sizes that no machine has side by side.
-std::vector<TooLarge> out_of_proportion_in(const Work& work, const Evidence::State& state);
-/// They are candidates no more. Columns that were appended since there were `groups` of them go as well.
-void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const Grams& grams, Work* work);
+/// Groups of chosen effects whose parts are, for sure, of sizes that no machine has side by side.
+std::vector<int> out_of_proportion_in(const Work& work, const Evidence::State& state);
+/// These are candidates no more. What was appended since there were `groups` of them goes as well.
+void set_aside(const std::vector<int>& these, std::size_t groups, const Grams& grams, Work* work);
 /// Warns of parameters below zero that no machine has so.
 void say_what_is_negative(Diagnosis* out);
 /// What looks like an effect that no machine has: said of the unknown at its joint, or as one of its own.

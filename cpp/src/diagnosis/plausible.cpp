@@ -83,19 +83,19 @@ static bool stands_out(const Evidence::State& state, const std::vector<Eigen::In
   });
 }
 
-std::vector<TooLarge> out_of_proportion_in(const Work& work, const Evidence::State& state) {
-  std::vector<TooLarge> out;
+std::vector<int> out_of_proportion_in(const Work& work, const Evidence::State& state) {
+  std::vector<int> out;
   for (const int g : state.choice.groups) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
     const double times = effect_traits(work, e).most_times_others;
     if (e.kind != Explanation::Kind::catalogue || !(times > 0.0)) continue;
     const std::vector<Eigen::Index> parts = main_part_and_others(work, state, g);
-    if (parts.size() > 1 && stands_out(state, parts, times)) out.push_back({g});
+    if (parts.size() > 1 && stands_out(state, parts, times)) out.push_back(g);
   }
   return out;
 }
 
-void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const Grams& grams, Work* work) {
+void set_aside(const std::vector<int>& these, std::size_t groups, const Grams& grams, Work* work) {
   Design& design = work->design;
   const Eigen::Index columns = grams.train.xx.cols();
   design.x.conservativeResize(Eigen::NoChange, columns);
@@ -105,8 +105,8 @@ void set_aside(const std::vector<TooLarge>& too_large, std::size_t groups, const
   design.candidates.groups.resize(groups);
   design.candidates.named.resize(groups);
   work->grams = grams;
-  for (const TooLarge& one : too_large) {
-    ColumnGroup& group = design.candidates.groups[static_cast<std::size_t>(one.group)];
+  for (const int g : these) {
+    ColumnGroup& group = design.candidates.groups[static_cast<std::size_t>(g)];
     group.shadow = true;
     group.columns.clear();
   }
