@@ -472,6 +472,51 @@ bool Evidence::may_enter(const State& state, int group) const {
   });
 }
 
+/// With one more group.
+static Choice with_one_more(Choice choice, const Evidence::Gain& gain) {
+  choice.groups.push_back(gain.group);
+  choice.scales.push_back(gain.scale);
+  return choice;
+}
+
+Evidence::Gain Evidence::best_of(const State& state, const std::vector<Gain>& gains, int but) const {
+  Gain best;
+  for (const Gain& gain : gains) {
+    if (gain.group != but && gain.score > best.score && may_enter(state, gain.group)) best = gain;
+  }
+  return best;
+}
+
+Evidence::Gain Evidence::addition_to(const State& state, const SearchOptions& options, std::size_t fewer) const {
+  std::vector<Gain> worth;
+  for (const Gain& gain : gains(state, options.threads)) {
+    const ColumnGroup& group = groups_[static_cast<std::size_t>(gain.group)];
+    const bool plain = group.corrects_law_at < 0 && group.columns.size() < fewer;
+    if (plain && gain.score > options.threshold && gain.share > options.least_share) worth.push_back(gain);
+  }
+  return best_of(state, worth, -1);
+}
+
+Evidence::State Evidence::two_in_place(const State& state, const State& less, int gone, const std::vector<Gain>& gains,
+                                       const SearchOptions& options) const {
+  constexpr double kMuch = 0.5;  ///< of what the group wins, that a plainer one wins alone
+  if (static_cast<int>(state.choice.groups.size()) >= options.most_groups) return state;
+  const auto size_of = [&](int group) { return groups_[static_cast<std::size_t>(group)].columns.size(); };
+  State best = state;
+  for (const Gain& plainer : gains) {
+    const bool much = plainer.score > kMuch * (state.score - less.score);
+    if (!much || size_of(plainer.group) >= size_of(gone) || !may_enter(less, plainer.group)) continue;
+    const State one = evaluate(with_one_more(less.choice, plainer));
+    const Gain beside = addition_to(one, options, size_of(gone) - size_of(plainer.group));
+    if (beside.group < 0 || one.score + beside.score < best.score) continue;
+    State two = evaluate(with_one_more(one.choice, beside));
+    if (two.score > best.score) best = std::move(two);
+  }
+  if (!(best.score > state.score + options.threshold)) return state;
+  const Gain more = addition_to(state, options, static_cast<std::size_t>(prior_.size()));
+  return best.score > state.score + options.threshold + std::max(0.0, more.score) ? best : state;
+}
+
 Evidence::State Evidence::improve(State state, const SearchOptions& options) const {
   const auto without = [&](const Choice& choice, std::size_t at) {
     Choice out;
@@ -496,18 +541,19 @@ Evidence::State Evidence::improve(State state, const SearchOptions& options) con
         break;
       }
       if (before - after > 1) continue;  // a law with its correction is not swapped
-      Gain best;
-      for (const Gain& gain : gains(less, options.threads)) {
-        if (may_enter(less, gain.group) && gain.group != state.choice.groups[at] && gain.score > best.score)
-          best = gain;
-      }
+      const int gone = state.choice.groups[at];
+      const std::vector<Gain> in_its_place = gains(less, options.threads);
+      const Gain best = best_of(less, in_its_place, gone);
       if (best.group < 0) continue;
-      Choice swapped = less.choice;
-      swapped.groups.push_back(best.group);
-      swapped.scales.push_back(best.scale);
-      const State other = evaluate(swapped);
+      const State other = evaluate(with_one_more(less.choice, best));
       if (other.score > state.score + 1.0) {
         state = other;
+        changed = true;
+        break;
+      }
+      State two = two_in_place(state, less, gone, in_its_place, options);
+      if (two.score > state.score) {
+        state = std::move(two);
         changed = true;
         break;
       }
@@ -545,9 +591,7 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
       const std::size_t width = state.choice.groups.empty() ? static_cast<std::size_t>(2 * options.beam)
                                                             : static_cast<std::size_t>(options.beam);
       for (std::size_t k = 0; k < std::min(ranked.size(), width); ++k) {
-        Choice grown = state.choice;
-        grown.groups.push_back(ranked[k].group);
-        grown.scales.push_back(ranked[k].scale);
+        const Choice grown = with_one_more(state.choice, ranked[k]);
         std::vector<int> key = grown.groups;
         std::sort(key.begin(), key.end());
         if (std::find(seen.begin(), seen.end(), key) != seen.end()) continue;

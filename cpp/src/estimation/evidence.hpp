@@ -173,6 +173,16 @@ class Evidence {
   /// L^-1 of the products of State::factor's columns with some others.
   Eigen::MatrixXd projected_on(const State& state, const std::vector<int>& columns) const;
   bool may_enter(const State& state, int group) const;
+  /// No group: none may enter.
+  Gain best_of(const State& state, const std::vector<Gain>& gains, int but) const;
+  /// What the search would add, of fewer columns than this: worth its place by itself, and no law's correction. No
+  /// group: nothing.
+  Gain addition_to(const State& state, const SearchOptions& options, std::size_t fewer) const;
+  /// A flexible group may have taken the place of a plainer one and of another beside it: the best two in its place
+  /// that have fewer columns together, if they win, by the threshold, more than the best one beside it would. Else the
+  /// state.
+  State two_in_place(const State& state, const State& less, int gone, const std::vector<Gain>& gains,
+                     const SearchOptions& options) const;
 
   const Gram& gram_;
   const std::vector<ColumnGroup>& groups_;

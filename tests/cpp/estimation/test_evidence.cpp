@@ -221,6 +221,69 @@ TEST_CASE("the search finds the groups that are there, and none in noise") {
   CHECK(none >= 19);
   CHECK(exact >= 19);
 }
+/// A constant, two plain columns, and one variable's hats on 10 to 17 knots, a group each.
+struct Hats {
+  static constexpr Eigen::Index kForms = 8;
+  Eigen::MatrixXd x;
+  std::vector<ColumnGroup> groups = {{{1}, 2.0}, {{2}, 2.0}};
+
+  explicit Hats(Eigen::Index rows) : x(Eigen::MatrixXd::Ones(rows, 3)) {
+    for (Eigen::Index form = 0; form < kForms; ++form) {
+      const Eigen::Index knots = 10 + form, first = x.cols();
+      x.conservativeResize(Eigen::NoChange, first + knots);
+      groups.push_back({{}, 2.0});
+      for (Eigen::Index k = 0; k < knots; ++k) groups.back().columns.push_back(static_cast<int>(first + k));
+      for (Eigen::Index i = 0; i < rows; ++i) {
+        const double at = static_cast<double>(i * (knots - 1)) / static_cast<double>(rows);
+        for (Eigen::Index k = 0; k < knots; ++k)
+          x(i, first + k) = std::max(0.0, 1.0 - std::abs(at - static_cast<double>(k)));
+      }
+    }
+  }
+};
+
+TEST_CASE("a flexible group, of which there are several, does not stand for two plain ones") {
+  constexpr Eigen::Index kRows = 300;
+  Hats hats(kRows);
+  for (Eigen::Index i = 0; i < kRows; ++i) {
+    const double at = static_cast<double>(i) / kRows;
+    hats.x(i, 1) = at;
+    hats.x(i, 2) = std::sin(6.0 * at);
+  }
+  for (const unsigned seed : {41u, 42u, 43u}) {
+    CAPTURE(seed);
+    const Eigen::VectorXd y = hats.x.col(1) + 0.1 * hats.x.col(2) + 0.05 * random_matrix(kRows, 1, seed);
+    const Gram gram = gram_of(hats.x, y);
+    const Evidence evidence(gram, hats.groups, {0}, Eigen::VectorXd::Ones(hats.x.cols()));
+    const auto gains = evidence.gains(evidence.evaluate({}));
+    for (std::size_t g = 2; g < hats.groups.size(); ++g) CHECK(gains[g].score > gains[0].score);  // they come first
+    std::vector<int> found = evidence.search({}).choice.groups;
+    std::sort(found.begin(), found.end());
+    CHECK(found == std::vector<int>{0, 1});
+  }
+}
+
+TEST_CASE("two groups in the place of one let nothing in that is too small to be added") {
+  constexpr Eigen::Index kRows = 4000;
+  Hats hats(kRows);
+  hats.x.col(1) = random_matrix(kRows, 1, 51);
+  hats.x.col(2) = random_matrix(kRows, 1, 52);
+  Eigen::VectorXd wave(kRows);
+  for (Eigen::Index i = 0; i < kRows; ++i) wave[i] = 0.2 * std::sin(9.0 * static_cast<double>(i) / kRows);
+  for (const unsigned seed : {53u, 54u, 55u}) {
+    CAPTURE(seed);
+    const Eigen::VectorXd y = wave + 0.01 * (hats.x.col(1) + hats.x.col(2)) + 0.1 * random_matrix(kRows, 1, seed);
+    const Gram gram = gram_of(hats.x, y);
+    const Evidence evidence(gram, hats.groups, {0}, Eigen::VectorXd::Ones(hats.x.cols()));
+    const Evidence::State found = evidence.search({});
+    REQUIRE(found.choice.groups.size() == 1);
+    const auto gains = evidence.gains(found);
+    for (const std::size_t small : {0u, 1u}) {
+      CHECK(gains[small].score > SearchOptions{}.threshold);
+      CHECK(gains[small].share < SearchOptions{}.least_share);
+    }
+  }
+}
 
 TEST_CASE("a law's correction enters only with its law, a shadow never") {
   Problem problem(100, 61);
