@@ -148,6 +148,13 @@ def _even_drift(view: View) -> list[Floats]:
     return [time[:, None] * column for column in view._frame_columns()[:6]]
 
 
+def drifts(view: View) -> list[Floats]:
+    """A base that drifts evenly or dies out, as `laws.drift` has it, by any of its six coordinates."""
+    share = view.context.hours
+    paths = (share, np.exp(-share / 0.25), np.exp(-share / 0.4))
+    return [path[:, None] * column for path in paths for column in view._frame_columns()[:6]]
+
+
 def _moving(context: Context, joint: int, values: Floats) -> Changes:
     changes = context.still()
     changes.motion[:, joint] = values

@@ -240,6 +240,17 @@ def test_a_mass_that_is_not_there_decides_no_side() -> None:
     assert side_of(np.array([-1e-7, 0.0, 1e-7, -0.1, 0.1])).tolist() == [0.0, 0.0, 0.0, -1.0, 1.0]
 
 
+def test_a_first_joint_that_creeps_is_a_base_that_drifts() -> None:
+    """Both turn all that is measured about the same axis: nobody can tell them apart."""
+    scene = make_scene(
+        sets.NUMBERING.request("development/unlisted/0@1"), "departures", needs=frozenset({"t"})
+    )
+    view = View(scene.context)
+    for joint, unlisted in ((0, False), (1, True), (2, True)):
+        creep = surprises.creep(scene.chain, joint, np.random.default_rng(0)).law(scene.context)
+        assert families.beyond(view, view.displaced(creep), scene.handed) == unlisted
+
+
 def test_no_axis_wobbles_more_than_the_catalogue_has_it() -> None:
     for name, effect in (
         ("axis_wobble", laws.axis_wobble(1, np.random.default_rng(0))),
