@@ -169,16 +169,21 @@ std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name) {
 }
 
 /// A function of the angle that a law moves a joint with wins much beside it: where this is too little to be found by
-/// itself, the name may be of a part of it.
+/// itself, the name may be of a part of it. So may a law of the joint's own angle that leaves some, and in whose place
+/// a step, a corner or a bump does better: of two laws that are both there, each of which makes up for what the other
+/// one lacks, nothing is left.
 static bool is_law_part(const Work& work, const Evidence& evidence, const Evidence::State& state,
                         const Contest& contest, int group) {
   constexpr double kMuch = 0.125;  ///< of what both win; the function has paid for its knots
+  constexpr double kSome = 2.0;    ///< nats
+  const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(group)];
   const double by_law = contest.removal_loss() + work.design.candidates.groups[static_cast<std::size_t>(group)].cost;
-  const std::vector<MovedBy> motions =
-      motions_of_law(work, work.design.candidates.named[static_cast<std::size_t>(group)]);
+  const std::vector<MovedBy> motions = motions_of_law(work, name);
   return std::any_of(motions.begin(), motions.end(), [&](const MovedBy& motion) {
     const double beside = best_function(work, evidence, state, motion.joint, motion.angle);
-    return beside > kMuch * (by_law + beside);
+    if (beside > kMuch * (by_law + beside)) return true;
+    return beside > kSome && follows_own_angle(effect_traits(work, name)) &&
+           best_local_shape(work, evidence, contest.less(), motion.joint, motion.angle) > by_law + kClassNats;
   });
 }
 

@@ -125,6 +125,15 @@ def test_a_law_that_is_most_of_an_unknown_function_is_doubted(which: str) -> Non
     assert named.grounds["law_is_part"] == 1.0 and named.probability < 0.7
 
 
+@pytest.mark.parametrize("which", ["97@10321", "56@10322", "24@10323"])
+def test_a_harmonic_in_whose_place_a_step_or_a_bump_does_better_is_doubted(which: str) -> None:
+    """A step and two bumps, one to two times the noise: harmonics of .91, .94 and .91."""
+    robot, data, label = make(f"development/unlisted/{which}")
+    (named,) = truing.diagnose(robot, data).effects
+    assert label["unlisted"] in {"step", "bump"} and named.effect == "harmonic"
+    assert named.grounds["law_is_part"] == 1.0 and named.probability < 0.7
+
+
 @pytest.mark.parametrize(("which", "joint"), [("0@9972", "J2"), ("5@9972", "A2")])
 def test_what_a_joint_that_hardens_leaves_is_no_harmonic(which: str, joint: str) -> None:
     """It was one of .94 and of .93 beside the joint's compliance."""
