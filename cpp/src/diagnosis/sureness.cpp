@@ -19,6 +19,7 @@ namespace truing::diagnosis {
 using Kind = Explanation::Kind;
 constexpr double kClassR2 = 0.98;
 constexpr double kClassNats = 3.0;
+constexpr double kSome = 2.0;  ///< nats that a function wins beside a law that leaves some of it
 
 bool same_name(const Explanation& a, const Explanation& b) { return a.effect == b.effect && a.joints == b.joints; }
 
@@ -168,6 +169,18 @@ std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name) {
   return out;
 }
 
+/// Another joint that moves as a function of the angle which a law of a joint's own follows: where that does better in
+/// the law's place, and the law leaves some of it, the name may be the other joint's.
+static bool is_law_of_another(const Work& work, const Evidence& evidence, const Evidence::State& state,
+                              const Contest& contest, const MovedBy& motion, double by_law) {
+  for (std::size_t joint = 0; joint < work.given.frames.robot.joints.size(); ++joint) {
+    if (joint != motion.joint && best_function(work, evidence, state, joint, motion.angle) > kSome &&
+        best_function(work, evidence, contest.less(), joint, motion.angle) > by_law + kClassNats)
+      return true;
+  }
+  return false;
+}
+
 /// A function of the angle that a law moves a joint with wins much beside it: where this is too little to be found by
 /// itself, the name may be of a part of it. So may a law of the joint's own angle that leaves some, and in whose place
 /// a step, a corner or a bump does better: of two laws that are both there, each of which makes up for what the other
@@ -175,15 +188,18 @@ std::vector<MovedBy> motions_of_law(const Work& work, const Explanation& name) {
 static bool is_law_part(const Work& work, const Evidence& evidence, const Evidence::State& state,
                         const Contest& contest, int group) {
   constexpr double kMuch = 0.125;  ///< of what both win; the function has paid for its knots
-  constexpr double kSome = 2.0;    ///< nats
   const Explanation& name = work.design.candidates.named[static_cast<std::size_t>(group)];
+  const EffectTraits& traits = effect_traits(work, name);
   const double by_law = contest.removal_loss() + work.design.candidates.groups[static_cast<std::size_t>(group)].cost;
   const std::vector<MovedBy> motions = motions_of_law(work, name);
   return std::any_of(motions.begin(), motions.end(), [&](const MovedBy& motion) {
     const double beside = best_function(work, evidence, state, motion.joint, motion.angle);
     if (beside > kMuch * (by_law + beside)) return true;
-    return beside > kSome && follows_own_angle(effect_traits(work, name)) &&
-           best_local_shape(work, evidence, contest.less(), motion.joint, motion.angle) > by_law + kClassNats;
+    if (!follows_own_angle(traits)) return false;
+    const bool shape_is_better = beside > kSome && best_local_shape(work, evidence, contest.less(), motion.joint,
+                                                                    motion.angle) > by_law + kClassNats;
+    return shape_is_better ||
+           (traits.driver != Driver::constant && is_law_of_another(work, evidence, state, contest, motion, by_law));
   });
 }
 

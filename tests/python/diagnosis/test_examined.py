@@ -134,6 +134,15 @@ def test_a_harmonic_in_whose_place_a_step_or_a_bump_does_better_is_doubted(which
     assert named.grounds["law_is_part"] == 1.0 and named.probability < 0.7
 
 
+@pytest.mark.parametrize("which", ["development/unlisted/11@10331", "examination/unlisted/93@46"])
+def test_a_law_in_whose_place_another_joint_does_better_is_doubted(which: str) -> None:
+    """A hose and a switch that one joint moves and another feels: a wobble of .88, a harmonic of .88."""
+    robot, data, label = make(which)
+    assert label["unlisted"] in {"bent_by_neighbour", "neighbour_switch"}
+    laws = [e for e in truing.diagnose(robot, data).effects if e.effect in {"axis_wobble", "harmonic"}]
+    assert [e.grounds["law_is_part"] for e in laws] == [1.0] and laws[0].probability < 0.7
+
+
 @pytest.mark.parametrize(("which", "joint"), [("0@9972", "J2"), ("5@9972", "A2")])
 def test_what_a_joint_that_hardens_leaves_is_no_harmonic(which: str, joint: str) -> None:
     """It was one of .94 and of .93 beside the joint's compliance."""
