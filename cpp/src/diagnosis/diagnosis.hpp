@@ -109,7 +109,7 @@ struct Sureness {
   double posterior = 0.0;        ///< of the class
   double removal_loss = 0.0;     ///< nats lost without it
   bool law_in_question = false;  ///< any function of its input does as well, or finds something beside it
-  bool law_is_part = false;      ///< of the angle that its law follows, a function makes much that the law does not
+  bool law_is_part = false;  ///< of the angle that its law follows, a function there or elsewhere does what it does not
 };
 
 /// Errors that a choice leaves of poses that its fit did not see, times the root of their weight.
