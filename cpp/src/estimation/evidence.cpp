@@ -438,18 +438,19 @@ std::function<double(const std::vector<int>&)> Evidence::explained(const State& 
   };
 }
 
-std::vector<Evidence::Gain> Evidence::gains(const State& state, int threads) const {
+std::vector<Evidence::Gain> Evidence::gains(const State& state, int threads, std::size_t fewer) const {
   constexpr std::size_t kGroupsAtATime = 16;
   if (eliminated_ > 0) threads = 1;
   const Projected projected = project(state, threads);
   std::vector<Gain> out(groups_.size());
   const auto one = [&](std::size_t g) {
     const std::vector<int>& columns = groups_[g].columns;
+    out[g].group = static_cast<int>(g);
+    if (columns.empty() || columns.size() >= fewer) return;
     Eigen::MatrixXd v(projected.v.rows(), static_cast<Eigen::Index>(columns.size()));
     for (Eigen::Index i = 0; i < v.cols(); ++i) v.col(i) = projected.v.col(columns[static_cast<std::size_t>(i)]);
     const Eigen::MatrixXd a = (eliminated_ == 0 ? rest(columns, columns) : rest_of_groups_[g]) - v.transpose() * v;
     out[g] = gain_of(state, a, rest(columns) - v.transpose() * projected.u, part(prior_, columns), groups_[g].cost);
-    if (columns.empty()) out[g].evidence = out[g].score = -1e300;
     out[g].group = static_cast<int>(g);
     for (std::size_t k = 0; k < columns.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
@@ -489,9 +490,8 @@ Evidence::Gain Evidence::best_of(const State& state, const std::vector<Gain>& ga
 
 Evidence::Gain Evidence::addition_to(const State& state, const SearchOptions& options, std::size_t fewer) const {
   std::vector<Gain> worth;
-  for (const Gain& gain : gains(state, options.threads)) {
-    const ColumnGroup& group = groups_[static_cast<std::size_t>(gain.group)];
-    const bool plain = group.corrects_law_at < 0 && group.columns.size() < fewer;
+  for (const Gain& gain : gains(state, options.threads, fewer)) {
+    const bool plain = groups_[static_cast<std::size_t>(gain.group)].corrects_law_at < 0;
     if (plain && gain.score > options.threshold && gain.share > options.least_share) worth.push_back(gain);
   }
   return best_of(state, worth, -1);
@@ -504,8 +504,9 @@ Evidence::State Evidence::two_in_place(const State& state, const State& less, in
   const auto size_of = [&](int group) { return groups_[static_cast<std::size_t>(group)].columns.size(); };
   State best = state;
   for (const Gain& plainer : gains) {
-    const bool much = plainer.score > kMuch * (state.score - less.score);
-    if (!much || size_of(plainer.group) >= size_of(gone) || !may_enter(less, plainer.group)) continue;
+    const bool much = plainer.score > std::max(options.threshold, kMuch * (state.score - less.score));
+    const bool leaves_room = size_of(plainer.group) + 1 < size_of(gone);
+    if (!much || !leaves_room || !may_enter(less, plainer.group)) continue;
     const State one = evaluate(with_one_more(less.choice, plainer));
     const Gain beside = addition_to(one, options, size_of(gone) - size_of(plainer.group));
     if (beside.group < 0 || one.score + beside.score < best.score) continue;
@@ -513,7 +514,7 @@ Evidence::State Evidence::two_in_place(const State& state, const State& less, in
     if (two.score > best.score) best = std::move(two);
   }
   if (!(best.score > state.score + options.threshold)) return state;
-  const Gain more = addition_to(state, options, static_cast<std::size_t>(prior_.size()));
+  const Gain more = addition_to(state, options, std::numeric_limits<std::size_t>::max());
   return best.score > state.score + options.threshold + std::max(0.0, more.score) ? best : state;
 }
 

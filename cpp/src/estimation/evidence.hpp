@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -129,7 +130,9 @@ class Evidence {
     double squares = 0.0;      ///< fall of the sum of squares, plain least squares
     int rank = 0;              ///< columns that the data can see
   };
-  std::vector<Gain> gains(const State& state, int threads = 1) const;
+  /// Groups of as many columns as `fewer` are not looked at.
+  std::vector<Gain> gains(const State& state, int threads = 1,
+                          std::size_t fewer = std::numeric_limits<std::size_t>::max()) const;
 
   /// The same for columns outside the Gram: theirs (X^T X, X^T y) after projection on the state, and their priors.
   Gain gain_of(const State& state, const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& prior,

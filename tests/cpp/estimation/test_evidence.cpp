@@ -221,6 +221,7 @@ TEST_CASE("the search finds the groups that are there, and none in noise") {
   CHECK(none >= 19);
   CHECK(exact >= 19);
 }
+
 /// A constant, two plain columns, and one variable's hats on 10 to 17 knots, a group each.
 struct Hats {
   static constexpr Eigen::Index kForms = 8;
