@@ -130,16 +130,16 @@ Eigen::LLT<Eigen::MatrixXd> factorised(Eigen::MatrixXd d) {
 namespace {
 
 /// So many columns at a time.
-constexpr Eigen::Index kBlock = 64;
+constexpr Eigen::Index kColumnsAtATime = 64;
 
 /// Calls work(first, count) for blocks of columns.
 template <typename Work>
 void for_blocks(Eigen::Index n, int threads, const Work& work) {
   const auto one = [&](std::size_t block) {
-    const Eigen::Index first = static_cast<Eigen::Index>(block) * kBlock;
-    work(first, std::min(kBlock, n - first));
+    const Eigen::Index first = static_cast<Eigen::Index>(block) * kColumnsAtATime;
+    work(first, std::min(kColumnsAtATime, n - first));
   };
-  for_each_on_threads(static_cast<std::size_t>((n + kBlock - 1) / kBlock), threads, {}, one, 1);
+  for_each_on_threads(static_cast<std::size_t>((n + kColumnsAtATime - 1) / kColumnsAtATime), threads, {}, one, 1);
 }
 
 /// L^-1, by blocks of columns, which are zero above the diagonal.
