@@ -221,9 +221,7 @@ bool put_in_its_place(Work* work, const Robot& robot, const Evidence::State& res
   const Evidence evidence = evidence_now(*work);
   const Evidence::Gain gain =
       evidence.gain(rest, work->design.candidates.groups[static_cast<std::size_t>(group)].columns, 0.0);
-  Choice choice = rest.choice;
-  choice.groups.push_back(group);
-  choice.scales.push_back(gain.scale);
+  const Choice choice = with_one_more(rest.choice, group, gain.scale);
   if (cross_validated(*work, choice) > kPredictsAsWell * before) return false;
   decision->state = keep_what_predicts(*work, evidence.evaluate(choice));
   return true;

@@ -320,10 +320,7 @@ static double share_of_shape(const Work& work, const Evidence& evidence, const E
   if (q.what.inputs.size() != 1 || q.what.law_test != LawTest::of_driver) return 0.0;
   const Evidence::Gain gain = evidence.gain(rest, columns_of_groups(work, {q.function}), 0.0);
   Decision alone;
-  Choice choice = rest.choice;
-  choice.groups.push_back(q.function);
-  choice.scales.push_back(gain.scale);
-  alone.state = evidence.evaluate(choice);
+  alone.state = evidence.evaluate(with_one_more(rest.choice, q.function, gain.scale));
   return share_of_local_shape(work, alone, q.function, q.joint);
 }
 
@@ -403,9 +400,7 @@ static bool replace_laws(Work* work, const Robot& robot, const Question& q, Deci
   extend_grams(work->design, work->noise.design_effect, &work->grams);
   const Evidence again = evidence_now(*work);
   const Evidence::Gain gain = again.gain(again.evaluate(remaining), columns_of_groups(*work, {fine}), 0.0);
-  Choice alone = remaining;
-  alone.groups.push_back(fine);
-  alone.scales.push_back(gain.scale);
+  const Choice alone = with_one_more(remaining, fine, gain.scale);
   if (cross_validated(*work, alone) < 1.06 * before) {
     decision->state = again.evaluate(alone);
     return true;
@@ -425,15 +420,11 @@ static void keep_as_correction(Work* work, const Evidence& evidence, int functio
       gone.push_back(other);
   }
   Choice choice = without_these(decision->state.choice, gone);
-  if (std::find(choice.groups.begin(), choice.groups.end(), law.group) == choice.groups.end()) {
-    choice.groups.push_back(law.group);
-    choice.scales.push_back(law.scale);
-  }
+  if (std::find(choice.groups.begin(), choice.groups.end(), law.group) == choice.groups.end())
+    choice = with_one_more(choice, law.group, law.scale);
   auto& groups = work->design.candidates.groups;
   const Evidence::Gain left = evidence.gain(evidence.evaluate(choice), columns_of_groups(*work, {function}), 0.0);
-  choice.groups.push_back(function);
-  choice.scales.push_back(left.scale);
-  decision->state = evidence.evaluate(choice);
+  decision->state = evidence.evaluate(with_one_more(choice, function, left.scale));
   decision->corrects[function] = law.group;
   const int number = groups[static_cast<std::size_t>(law.group)].law_at;
   if (number < 0) return;
@@ -541,9 +532,8 @@ static bool add_free_function(Work* work, const FreeScan& scan, Decision* out) {
   append_free(work, best, scan.tried);
   extend_grams(work->design, work->noise.design_effect, &work->grams);
   const Evidence with = evidence_now(*work);
-  Choice grown = out->state.choice;
-  grown.groups.push_back(static_cast<int>(work->design.candidates.groups.size()) - 1);
-  grown.scales.push_back(best.gain.scale);
+  const int function = static_cast<int>(work->design.candidates.groups.size()) - 1;
+  const Choice grown = with_one_more(out->state.choice, function, best.gain.scale);
   Evidence::State next = with.improve(with.evaluate(grown), search);
   next = keep_what_predicts(*work, with.search(search, next.choice));
   // Names that were given before the function was known may stand for parts of it: once more without them.

@@ -290,9 +290,7 @@ Choice Search::run(Choice choice, const SearchLimits& limits, bool free_function
       if (gain.score < limits.threshold) break;
       if (!may_enter(choice, gain.group, limits, free_functions)) continue;
       if (std::find(refused.begin(), refused.end(), gain.group) != refused.end()) continue;
-      Choice grown = choice;
-      grown.groups.push_back(gain.group);
-      grown.scales.push_back(gain.scale);
+      const Choice grown = with_one_more(choice, gain.group, gain.scale);
       const bool possible = !limits.plausible_only || is_plausible(state(grown), gain.group);
       if (!possible || !predicts(squares, squares_of_folds(grown), limits)) {
         refused.push_back(gain.group);

@@ -473,10 +473,9 @@ bool Evidence::may_enter(const State& state, int group) const {
   });
 }
 
-/// With one more group.
-static Choice with_one_more(Choice choice, const Evidence::Gain& gain) {
-  choice.groups.push_back(gain.group);
-  choice.scales.push_back(gain.scale);
+Choice with_one_more(Choice choice, int group, double scale) {
+  choice.groups.push_back(group);
+  choice.scales.push_back(scale);
   return choice;
 }
 
@@ -507,10 +506,10 @@ Evidence::State Evidence::two_in_place(const State& state, const State& less, in
     const bool much = plainer.score > std::max(options.threshold, kMuch * (state.score - less.score));
     const bool leaves_room = size_of(plainer.group) + 1 < size_of(gone);
     if (!much || !leaves_room || !may_enter(less, plainer.group)) continue;
-    const State one = evaluate(with_one_more(less.choice, plainer));
+    const State one = evaluate(with_one_more(less.choice, plainer.group, plainer.scale));
     const Gain beside = addition_to(one, options, size_of(gone) - size_of(plainer.group));
     if (beside.group < 0 || one.score + beside.score < best.score) continue;
-    State two = evaluate(with_one_more(one.choice, beside));
+    State two = evaluate(with_one_more(one.choice, beside.group, beside.scale));
     if (two.score > best.score) best = std::move(two);
   }
   if (!(best.score > state.score + options.threshold)) return state;
@@ -546,7 +545,7 @@ Evidence::State Evidence::improve(State state, const SearchOptions& options) con
       const std::vector<Gain> in_its_place = gains(less, options.threads);
       const Gain best = best_of(less, in_its_place, gone);
       if (best.group < 0) continue;
-      const State other = evaluate(with_one_more(less.choice, best));
+      const State other = evaluate(with_one_more(less.choice, best.group, best.scale));
       if (other.score > state.score + 1.0) {
         state = other;
         changed = true;
@@ -592,7 +591,7 @@ Evidence::State Evidence::search(const SearchOptions& options, const Choice& sta
       const std::size_t width = state.choice.groups.empty() ? static_cast<std::size_t>(2 * options.beam)
                                                             : static_cast<std::size_t>(options.beam);
       for (std::size_t k = 0; k < std::min(ranked.size(), width); ++k) {
-        const Choice grown = with_one_more(state.choice, ranked[k]);
+        const Choice grown = with_one_more(state.choice, ranked[k].group, ranked[k].scale);
         std::vector<int> key = grown.groups;
         std::sort(key.begin(), key.end());
         if (std::find(seen.begin(), seen.end(), key) != seen.end()) continue;

@@ -86,6 +86,7 @@ struct Choice {
   std::vector<int> groups;
   std::vector<double> scales;
 };
+Choice with_one_more(Choice choice, int group, double scale);
 
 /// What becomes of the columns that are always in.
 enum class Nuisance {
@@ -130,7 +131,7 @@ class Evidence {
     double squares = 0.0;      ///< fall of the sum of squares, plain least squares
     int rank = 0;              ///< columns that the data can see
   };
-  /// Groups of as many columns as `fewer` are not looked at.
+  /// Only groups of fewer columns than `fewer` are looked at: the others win nothing.
   std::vector<Gain> gains(const State& state, int threads = 1,
                           std::size_t fewer = std::numeric_limits<std::size_t>::max()) const;
 

@@ -428,6 +428,9 @@ def linkage(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
 # ---- Frames and instrument -----------------------------------------------------------------------
 
 
+DYING_OUT = (0.25, 0.4)  # time constants of a drift that dies out, over the time that was recorded
+
+
 def drift(joint: int, rng: Generator, depart: float = 0.0) -> Hidden:
     """Base or tracker moves: evenly, dying out, or wandering; with departure it jumps as well."""
     kind = str(rng.choice(["even", "dying", "wandering"]))
@@ -454,7 +457,8 @@ def _path(kind: str, rng: Generator, depart: float) -> Callable[[Floats], Floats
     if kind == "wandering":
         walk = np.cumsum(rng.normal(0.0, 1.0 / 20.0, (400, 2)), axis=0)
     elif kind == "dying":
-        walk = np.stack([1.0 - np.exp(-knots / 0.25), 0.5 * (1.0 - np.exp(-knots / 0.4))], axis=1)
+        first, second = (1.0 - np.exp(-knots / time) for time in DYING_OUT)
+        walk = np.stack([first, 0.5 * second], axis=1)
     else:
         walk = np.stack([knots, -0.6 * knots], axis=1)
     if depart:

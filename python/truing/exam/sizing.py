@@ -149,10 +149,10 @@ def _even_drift(view: View) -> list[Floats]:
 
 
 def drifts(view: View) -> list[Floats]:
-    """A base that drifts evenly or dies out, as `laws.drift` has it, by any of its six coordinates."""
-    share = view.context.hours
-    paths = (share, np.exp(-share / 0.25), np.exp(-share / 0.4))
-    return [path[:, None] * column for path in paths for column in view._frame_columns()[:6]]
+    """A base that drifts evenly or comes to rest, as `laws.drift` has it, by any of its six coordinates."""
+    paths = [np.exp(-view.context.hours / time) for time in laws.DYING_OUT]
+    dying = [path[:, None] * column for path in paths for column in view._frame_columns()[:6]]
+    return _even_drift(view) + dying
 
 
 def _moving(context: Context, joint: int, values: Floats) -> Changes:
