@@ -1195,9 +1195,12 @@ class IdentifyOptions:
     shrink_beyond = 0.05: Where the rows know a link only to more than this [rad, m], it would run away: links are then fitted
         near the nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors
         or bounds of one's own.
+    resamples = 8: Where the rows speak for links farther off than robots are, the fit to a few other poses may end at
+        other values: standard errors are then what so many fits scatter by whose poses have weights drawn
+        at random. 0: they are those about the one fit, as everywhere else.
     threads = 0: 0: as many as the machine has.
     """
-    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, priors: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}, prior_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, shrink_beyond: typing.SupportsFloat | typing.SupportsIndex = 0.05, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, free: collections.abc.Sequence[str] = [], hold: collections.abc.Sequence[str] = [], effects: collections.abc.Sequence[EffectRequest] = [], hayati_angle: typing.SupportsFloat | typing.SupportsIndex = 0.08726646259971647, max_iterations: typing.SupportsInt | typing.SupportsIndex = 5000, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 1e-09, rms_fall: typing.SupportsFloat | typing.SupportsIndex = 1e-12, gradient: typing.SupportsFloat | typing.SupportsIndex = 1e-14, undamped: bool = False, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, solver: typing.Literal['lm', 'ceres'] = 'lm', loss: typing.Literal['reject', 'none', 'huber', 'cauchy', 'tukey'] = 'reject', frame_by: typing.Literal['parameters', 'svd'] = 'parameters', rotation_length: typing.SupportsFloat | typing.SupportsIndex = 0.1, test_share: typing.SupportsFloat | typing.SupportsIndex = 0.2, seed: typing.SupportsInt | typing.SupportsIndex = 0, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06, priors: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}, prior_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 6.0, shrink_beyond: typing.SupportsFloat | typing.SupportsIndex = 0.05, resamples: typing.SupportsInt | typing.SupportsIndex = 8, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -1338,6 +1341,16 @@ class IdentifyOptions:
     def reject_beyond(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def resamples(self) -> int:
+        """
+        Where the rows speak for links farther off than robots are, the fit to a few other poses may end at
+        other values: standard errors are then what so many fits scatter by whose poses have weights drawn
+        at random. 0: they are those about the one fit, as everywhere else.
+        """
+    @resamples.setter
+    def resamples(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def rms_fall(self) -> float:
         """
         [m] stop when an accepted step lowers the rms by no more (the method's own: 1e-3 mm)
@@ -1460,6 +1473,12 @@ class Identification:
     def frozen(self) -> tuple[Frozen, ...]:
         """
         What the data cannot see.
+        """
+    @property
+    def local_sigma(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shape=(rank,): standard errors about this one fit, of the fitted parameters in their units. Those of
+        `parameters` and `covariance` are larger where they are what `resamples` fits scatter by.
         """
     @property
     def noise_sigma(self) -> float:

@@ -71,6 +71,10 @@ class IdentifyKeywords(TypedDict, total=False):
     """Where the rows know a link only to more than this [rad, m], it would run away: links are then fitted
     near the nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors
     or bounds of one's own."""
+    resamples: int
+    """Where the rows speak for links farther off than robots are, the fit to a few other poses may end at
+    other values: standard errors are then what so many fits scatter by whose poses have weights drawn
+    at random. 0: they are those about the one fit, as everywhere else."""
     threads: int
     """0: as many as the machine has."""
 

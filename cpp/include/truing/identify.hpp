@@ -60,6 +60,10 @@ struct IdentifyOptions : ParameterSelection, SolverOptions {
   /// nominal robot, under a prior whose size the rows choose. Infinity: never. Not beside priors or bounds of one's
   /// own.
   double shrink_beyond = 0.05;
+  /// Where the rows speak for links farther off than robots are, the fit to a few other poses may end at other values:
+  /// standard errors are then what so many fits scatter by whose poses have weights drawn at random. 0: they are those
+  /// about the one fit, as everywhere else.
+  int resamples = 8;
   int threads = 0;  ///< 0: as many as the machine has
 
   /// False, and why, when an option makes no sense.
@@ -79,6 +83,9 @@ struct Identification {
   std::vector<Parameter> parameters;  ///< every parameter asked for, frozen ones included
   /// shape=(rank, rank), of the fitted (not frozen) parameters in order of `parameters`, in their units.
   Eigen::MatrixXd covariance;
+  /// shape=(rank,): standard errors about this one fit, of the fitted parameters in their units. Those of `parameters`
+  /// and `covariance` are larger where they are what `resamples` fits scatter by.
+  Eigen::VectorXd local_sigma;
   std::vector<Frozen> frozen;              ///< what the data cannot see
   BeforeAfter train;                       ///< errors of the training rows
   std::optional<BeforeAfter> test;         ///< errors of the held-out rows, if any

@@ -7,6 +7,7 @@
 
 #include "identification/asked.hpp"
 #include "identification/report.hpp"
+#include "identification/resamples.hpp"
 #include "identification/shrink.hpp"
 #include "identification/start.hpp"
 #include "identification/uncertainty.hpp"
@@ -28,6 +29,7 @@ bool IdentifyOptions::is_valid(std::string* error) const {
   if (!(rank_tolerance > 0.0 && rank_tolerance < 1.0)) return fail("rank_tolerance must be in (0, 1)");
   if (!(reject_beyond > 1.0)) return fail("reject_beyond must be more than 1 median");
   if (!(shrink_beyond > 0.0)) return fail("shrink_beyond must be positive [rad, m]; infinity: never");
+  if (resamples < 0) return fail("resamples must not be negative");
   if (!bounds.empty() && solver != Solver::ceres) return fail("bounds need solver = ceres");
   if (frame_by == FrameBy::svd && solver == Solver::ceres) return fail("frame_by = svd needs solver = lm");
   if (!(prior_noise >= 0.0 && std::isfinite(prior_noise))) return fail("prior_noise must be finite and not negative");
@@ -135,12 +137,17 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   result.noise_sigma = known.noise;
   result.rotation_noise_sigma = known.rotation_noise;
   report_parameters(nominal_model, model, seen, found, &result);
+  result.local_sigma = result.covariance.diagonal().cwiseSqrt();
+  int fits = 0;  // whose scatter is known; none where nobody asks
+  if (off > kFarOff) fits = count_scatter(nominal, data, options, rows.pose, &result);
   report_errors(job, asked.content, rows.test, start.values, found, &result);
   result.warnings = make_warnings(result, asked.values, spread_of(job, found.rejected));
   if (off > kFarOff)
     result.warnings.push_back(
         "the rows hardly see some links, and speak for links farther off than robots are: robots of other values may "
-        "fit them as well, and standard errors are about this one");
+        "fit them as well, and standard errors are " +
+        (fits > 0 ? "what " + std::to_string(fits) + " fits to poses weighed at random scatter by"
+                  : std::string("about this one")));
   return result;
 }
 

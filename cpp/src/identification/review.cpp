@@ -103,7 +103,9 @@ class Workshop {
   /// Zeros of joints among them: a sign is fitted by one that turns half round, too.
   std::vector<Parameter> changes(const Identification& found) const {
     std::vector<Parameter> out;
-    for (const Parameter& p : found.parameters) {
+    Eigen::Index at = 0;
+    for (Parameter p : found.parameters) {
+      if (!p.frozen) p.sigma = found.local_sigma[at++];  // other fits end elsewhere, but as far off
       if (excess(p) > 0.0) out.push_back(p);
     }
     std::stable_sort(out.begin(), out.end(),
@@ -133,6 +135,7 @@ class Trials {
   Trials(const Measurements& data, const IdentifyOptions& options)
       : sample_(sample_of(data, kRows)), options_(options) {
     options_.test_share = 0.0;
+    options_.resamples = 0;
     options_.bounds.clear();
     options_.solver = Solver::lm;
     options_.frame_by = FrameBy::parameters;

@@ -31,6 +31,9 @@ class Random {
     return r * std::cos(uniform(0.0, 6.283185307179586));
   }
 
+  /// Exponential, of mean 1.
+  double exponential() { return -std::log(1.0 - uniform(0.0, 1.0)); }
+
   /// 0 … count - 1
   std::uint64_t below(std::uint64_t count) { return next() % count; }
 

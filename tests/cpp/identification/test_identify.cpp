@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -257,8 +258,9 @@ TEST_CASE("links that the rows hardly see stay near the nominal robot, by as muc
 }
 
 TEST_CASE("links that are farther off than robots are are fitted freely, from near the nominal robot") {
-  IdentifyOptions freely;
+  IdentifyOptions freely, one_fit;
   freely.shrink_beyond = std::numeric_limits<double>::infinity();
+  one_fit.resamples = 0;
   double near = 0.0, anywhere = 0.0;  // errors on fresh poses
   for (const unsigned seed : {34u, 35u, 36u, 37u, 38u, 39u}) {
     CAPTURE(seed);
@@ -269,9 +271,11 @@ TEST_CASE("links that are farther off than robots are are fitted freely, from ne
       other.joints[k].a *= 1.5;
       other.joints[k].d += 0.2;
     }
-    const Identification found = truing::identify(other, c.table->data);
+    const Identification found = truing::identify(other, c.table->data, one_fit);
     CHECK(found.shrunk_to == 0.0);
     CHECK(contains(found.warnings.back(), "robots of other values may fit them as well"));
+    CHECK(contains(found.warnings.back(), "about this one"));
+    CHECK(found.local_sigma == found.covariance.diagonal().cwiseSqrt());
     CHECK(found.test->after.rms < 3e-4);
     for (const truing::Parameter& p : found.parameters) {
       if (!p.frozen && p.name[0] == 'J') CHECK(std::abs(p.value - p.nominal) < 3.2);  // less than half a turn
@@ -280,6 +284,30 @@ TEST_CASE("links that are farther off than robots are are fitted freely, from ne
     anywhere += fresh_rms(c.truth, truing::identify(other, c.table->data, freely).robot, seed);
   }
   CHECK(near < 0.8 * anywhere);
+}
+
+TEST_CASE("standard errors of links that are far off are what fits to poses weighed at random scatter by") {
+  const Ur10Case c(60, 1e-4, 40, What::position, 0.02);
+  Robot other = c.nominal;
+  for (const std::size_t k : {1u, 2u, 3u}) other.joints[k].offset += 0.5;
+  IdentifyOptions options, one_fit;
+  options.resamples = 4;
+  one_fit.resamples = 0;
+  const Identification found = truing::identify(other, c.table->data, options),
+                       alone = truing::identify(other, c.table->data, one_fit);
+  CHECK(contains(found.warnings.back(), "what 4 fits to poses weighed at random scatter by"));
+  for (std::size_t k = 0; k < found.parameters.size(); ++k)
+    CHECK(std::memcmp(&found.parameters[k].value, &alone.parameters[k].value, sizeof(double)) == 0);
+  CHECK(found.local_sigma == alone.local_sigma);
+  // Each of the four adds to the squares what it has other values by; the errors about the fit count as one more.
+  const Eigen::MatrixXd more = 5.0 * found.covariance - alone.covariance;
+  CHECK(more.diagonal().minCoeff() > 0.0);
+  CHECK(more.diagonal().cwiseQuotient(alone.covariance.diagonal()).mean() > 4.0 * 0.3);
+  options.threads = 1;
+  const Identification serial = truing::identify(other, c.table->data, options);
+  CHECK(serial.covariance == found.covariance);
+  options.resamples = -1;
+  CHECK(contains(complaint(c.nominal, c.table->data, options), "resamples must not be negative"));
 }
 
 TEST_CASE("where the rows see every link, or somebody knows more of them, nothing is shrunk") {
