@@ -20,6 +20,8 @@ from truing.exam.names import FINDINGS
 _Z90 = 1.6448536269514722
 _CONFIDENT = 0.9
 _GEOMETRY = ("link_geometry", "joint_offset")  # what lies underneath, by either name
+_RECORDED = frozenset({"transmission_error"})
+"""What lies under spikes: recorded arms have teeth, which no flexible fit of smooth functions takes away."""
 _SHARED = frozenset({"several", "teeth"})  # one cause on several joints: the smallest may be named or not
 _WHOLE = frozenset({"drift", "scale", "joint_coupling", "time_offset"})
 Floats = NDArray[np.float64]
@@ -142,8 +144,11 @@ def called_right(named: Named, label: Label) -> bool:
 
 
 def underneath(label: Label) -> frozenset[str]:
-    """What is rightly named of any joint, because link values, or inertias, are wrong everywhere."""
-    return frozenset(label.get("underneath", _GEOMETRY)) if label["geometry_underneath"] else frozenset()
+    """What is rightly named of any joint: link values, or inertias, are wrong, or the recording has it."""
+    recorded = _RECORDED if label["source"] == "spike" else frozenset()
+    if not label["geometry_underneath"]:
+        return recorded
+    return recorded | frozenset(label.get("underneath", _GEOMETRY))
 
 
 def counted(sheet: Sheet) -> list[Named]:

@@ -965,6 +965,15 @@ def test_geometry_underneath_is_right_and_does_not_count() -> None:
     assert share([sheet(truth, both)], "first_physics") == 0.0
 
 
+def test_teeth_of_a_recording_do_not_count_before_a_spike() -> None:
+    teeth, play = Named("transmission_error", ("J1",)), Named("backlash", ("J2",))
+    truth = [("backlash", "J2")]
+    assert share([sheet(truth, [teeth, play], source="spike")], "first_spike") == 1.0
+    assert share([sheet(truth, [teeth], source="spike")], "first_spike") == 0.0
+    assert share([sheet(truth, [Named("harmonic", ("J1",)), play], source="spike")], "first_spike") == 0.0
+    assert share([sheet(truth, [teeth, play], source="departures")], "first_departures") == 0.0
+
+
 def test_a_twin_alone_and_for_certain_is_wrong() -> None:
     twin = {
         "family": "confounded",
