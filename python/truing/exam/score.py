@@ -247,9 +247,8 @@ def _excused(sheet: Sheet, item: Named, truths: Sequence[Effect]) -> bool:
 
 
 def false_alarm(sheet: Sheet) -> bool:
-    """Something is named though nothing is wrong. A wandering frame may be called drift."""
-    allowed = {"drift"} if sheet.label.get("kind") == "drift" else set()
-    return bool(sheet.answer.unknown) or any(item.effect not in allowed for item in sheet.answer.effects)
+    """Something is named though nothing is wrong. The drift of a wandering frame is right."""
+    return bool(sheet.answer.unknown) or any(not right(item, sheet.label) for item in sheet.answer.effects)
 
 
 def place_right(sheet: Sheet) -> bool:
@@ -946,11 +945,7 @@ def stated_names(sheet: Sheet) -> list[tuple[Named, bool]]:
     """Every named effect of which it is known whether it is right; of recordings none is."""
     if sheet.label["source"] == "spike":
         return []
-    drifts = sheet.label.get("kind") == "drift"
-    return [
-        (item, (drifts and item.effect == "drift") or _excusable(sheet, item))
-        for item in sheet.answer.effects
-    ]
+    return [(item, _excusable(sheet, item)) for item in sheet.answer.effects]
 
 
 def calibration(sheets: Sequence[Sheet]) -> Calibration:

@@ -1112,10 +1112,13 @@ def test_confidence_is_judged_within_each_family() -> None:
 
 
 def test_only_drift_may_be_named_where_the_frame_wanders() -> None:
-    def wandering(effect: str) -> Sheet:
-        return sheet([], [Named(effect, ())], family="none", kind="drift")
+    def wandering(*effects: str) -> Sheet:
+        first, *others = effects
+        item = Named(first, (), same=tuple((other, ()) for other in others))
+        return sheet([("drift", "")], [item], family="none", kind="drift")
 
     assert share([wandering("drift"), wandering("scale")], "alarm_other") == 0.5
+    assert share([wandering("scale", "drift")], "alarm_other") == 0.0
 
 
 def test_inputs_of_an_unlisted_effect_are_called_as_a_diagnosis_calls_them() -> None:
