@@ -173,8 +173,9 @@ std::string barely_seen(const std::vector<Parameter>& parameters) {
   for (const Parameter& parameter : parameters) {
     const bool length = parameter.unit == "m";
     if (parameter.frozen || !(length || parameter.unit == "rad") || !(parameter.sigma > 0.01)) continue;
-    out += (out.empty() ? "" : ", ") + parameter.name + " (" + three_digits(1e3 * parameter.sigma) +
-           (length ? " mm)" : " mrad)");
+    const bool large = parameter.sigma >= 1.0;
+    out += (out.empty() ? "" : ", ") + parameter.name + " (" + three_digits((large ? 1.0 : 1e3) * parameter.sigma) +
+           (large ? " " : " m") + (length ? "m)" : "rad)");
   }
   return out;
 }
