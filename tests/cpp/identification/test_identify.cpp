@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -299,6 +300,13 @@ TEST_CASE("standard errors of links that are far off are what fits to poses weig
   for (std::size_t k = 0; k < found.parameters.size(); ++k)
     CHECK(std::memcmp(&found.parameters[k].value, &alone.parameters[k].value, sizeof(double)) == 0);
   CHECK(found.local_sigma == alone.local_sigma);
+  CHECK(found.covariance != alone.covariance);
+  Eigen::Index at = 0;
+  for (const truing::Parameter& p : found.parameters) {
+    if (p.frozen) continue;
+    CHECK(p.sigma == std::sqrt(found.covariance(at, at)));
+    ++at;
+  }
   // Each of the four adds to the squares what it has other values by; the errors about the fit count as one more.
   const Eigen::MatrixXd more = 5.0 * found.covariance - alone.covariance;
   CHECK(more.diagonal().minCoeff() > 0.0);
