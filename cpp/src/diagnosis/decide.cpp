@@ -18,13 +18,14 @@ namespace truing::diagnosis {
 
 using Kind = Explanation::Kind;
 constexpr int kNullDraws = 200;
-constexpr double kNoBetter = 1.004;   ///< a group must lower the cross-validated sum of squares by more than this
-constexpr double kMuchBetter = 1.05;  ///< sums of squares that are worth another choice
-constexpr double kNoChance = 1.5;     ///< sums of squares that noise alone does not make so unequal
-constexpr double kChance = 0.05;      ///< of random signs, that a free function may have at most
-constexpr double kFreeShare = 0.04;   ///< of what is left, that a free function must explain
-constexpr int kMostTurns = 4;         ///< of search and questions
-constexpr double kWholly = 0.95;      ///< of a function, that a law or a plain shape makes: then it is that
+constexpr double kNoBetter = 1.004;     ///< a group must lower the cross-validated sum of squares by more than this
+constexpr double kMuchBetter = 1.05;    ///< sums of squares that are worth another choice
+constexpr double kNoChance = 1.5;       ///< sums of squares that noise alone does not make so unequal
+constexpr double kChance = 0.05;        ///< of random signs, that a free function may have at most
+constexpr double kFreeShare = 0.04;     ///< of what is left, that a free function must explain
+constexpr double kFunctionFirst = 1.5;  ///< times the nats of an order, that a function wins to go before it
+constexpr int kMostTurns = 4;           ///< of search and questions
+constexpr double kWholly = 0.95;        ///< of a function, that a law or a plain shape makes: then it is that
 
 const EffectTraits& effect_traits(const Work& work, const Explanation& e) {
   return model::traits_of(e.effect, work.given.options.own_effects);
@@ -697,7 +698,8 @@ static std::vector<FunctionBeside> functions_beside(const FreeScan& scan) {
   return out;
 }
 
-/// Free functions and orders of gears on what the names leave, the better one first. Returns the next round's seed.
+/// Free functions and orders of gears on what the names leave, the better one first; where they win about as much, the
+/// order: machines have it. Returns the next round's seed.
 static std::uint64_t add_what_is_unnamed(Work* work, const Robot& robot, std::uint64_t seed, Gears* gears,
                                          Decision* out) {
   constexpr int kMostRounds = 6;
@@ -711,10 +713,10 @@ static std::uint64_t add_what_is_unnamed(Work* work, const Robot& robot, std::ui
     out->p_left = scan.p;
     out->beside = functions_beside(scan);
     const OrderAt order = gears->best(evidence, out->state);
-    const bool order_is_better = scan.best.empty() || order.in_noise > scan.best.front().gain.score;
-    if (order_is_better && gears->take(order, out)) continue;
+    const bool order_first = scan.best.empty() || kFunctionFirst * order.in_noise > scan.best.front().gain.score;
+    if (order_first && gears->take(order, out)) continue;
     if (add_free_function(work, scan, out)) continue;
-    if (order_is_better || !gears->take(order, out)) break;
+    if (order_first || !gears->take(order, out)) break;
   }
   return seed;
 }
