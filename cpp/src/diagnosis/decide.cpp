@@ -721,6 +721,50 @@ static std::uint64_t add_what_is_unnamed(Work* work, const Robot& robot, std::ui
   return seed;
 }
 
+/// Sizes of groups were chosen when others were not in yet, or had not gone.
+static void size_again(const Work& work, Decision* out) {
+  const Evidence evidence = evidence_now(work);
+  const auto& groups = work.design.candidates.groups;
+  for (std::size_t at = 0; at < out->state.choice.groups.size(); ++at) {
+    const int group = out->state.choice.groups[at];
+    const Evidence::State rest = evidence.evaluate(without_these(out->state.choice, {group}));
+    Choice other = out->state.choice;
+    other.scales[at] = evidence.gain(rest, groups[static_cast<std::size_t>(group)].columns, 0.0).scale;
+    if (other.scales[at] == out->state.choice.scales[at]) continue;
+    Evidence::State next = evidence.evaluate(other);
+    if (next.score > out->state.score) out->state = std::move(next);
+  }
+}
+
+/// What did not predict other poses, or questions took away, may have stood in a name's way: of those that were not
+/// `asked` about, the one that wins most, if it predicts. True: it was taken.
+static bool add_name(const Work& work, const std::set<int>& asked, Decision* out) {
+  if (!has_room(*out)) return false;
+  const Evidence evidence = evidence_now(work);
+  const SearchOptions& search = out->search;
+  Evidence::Gain best;
+  for (const Evidence::Gain& gain : evidence.gains(out->state, search.threads)) {
+    const bool wins = gain.score > search.threshold && gain.share > search.least_share;
+    if (wins && asked.count(gain.group) == 0 && gain.score > best.score &&
+        is_candidate(work.design.candidates.named[static_cast<std::size_t>(gain.group)]) &&
+        evidence.may_enter(out->state, gain.group))
+      best = gain;
+  }
+  if (best.group < 0) return false;
+  const Choice more = with_one_more(out->state.choice, best.group, best.scale);
+  if (!predicts_better(squares_of_folds(work, more), squares_of_folds(work, out->state.choice), kNoBetter))
+    return false;
+  out->state = evidence.evaluate(more);
+  return true;
+}
+
+/// Questions about what is chosen: not to be asked again of what they take away.
+static void question_all(Work* work, const Robot& robot, std::set<int>* asked, Decision* out) {
+  asked->insert(out->state.choice.groups.begin(), out->state.choice.groups.end());
+  question_bundles(work, robot, out);
+  question_laws(work, robot, out);
+}
+
 /// Of the candidates that there are.
 static Decision explain(Work* work, const Robot& robot) {
   const DiagnoseOptions& options = work->given.options;
@@ -736,13 +780,15 @@ static Decision explain(Work* work, const Robot& robot) {
   out.state = search_named(*work, out);
   // What questions take away leaves room for what there was none for.
   std::uint64_t seed = options.seed + 101;
+  std::set<int> asked;
   for (int turn = 0; turn < kMostTurns; ++turn) {
     seed = add_what_is_unnamed(work, robot, seed, &gears, &out);
     const bool was_full = !has_room(out);
-    question_bundles(work, robot, &out);
-    question_laws(work, robot, &out);
+    question_all(work, robot, &asked, &out);
     if (!was_full || !has_room(out)) break;
   }
+  size_again(*work, &out);
+  for (int turn = 0; turn < kMostTurns && add_name(*work, asked, &out); ++turn) question_all(work, robot, &asked, &out);
   prefer_links_that_predict(*work, &out);
   if (out.p_gap > options.false_alarm && work->given.beyond_repeats <= kLackOfFit) keep_what_is_no_chance(*work, &out);
   return out;

@@ -142,6 +142,9 @@ class Evidence {
   /// What adding columns of the Gram would win.
   Gain gain(const State& state, const std::vector<int>& columns, double cost) const;
 
+  /// The group is no shadow, is not in yet, and what it corrects is.
+  bool may_enter(const State& state, int group) const;
+
   /// What is left of a column's square beyond the state's columns.
   double visible(const State& state, int column) const;
 
@@ -176,7 +179,6 @@ class Evidence {
   const Eigen::VectorXd& rest_row(int column) const;  ///< kept
   /// L^-1 of the products of State::factor's columns with some others.
   Eigen::MatrixXd projected_on(const State& state, const std::vector<int>& columns) const;
-  bool may_enter(const State& state, int group) const;
   /// No group: none may enter.
   Gain best_of(const State& state, const std::vector<Gain>& gains, int but) const;
   /// What the search would add, of fewer columns than this: worth its place by itself, and no law's correction. No
