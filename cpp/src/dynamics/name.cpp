@@ -3,9 +3,12 @@
 #include "dynamics/name.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <set>
 
 #include "dynamics/beside.hpp"
@@ -13,6 +16,7 @@
 #include "dynamics/payload.hpp"
 #include "dynamics/remainder.hpp"
 #include "estimation/confidence.hpp"
+#include "math/batch.hpp"
 #include "math/text.hpp"
 
 namespace truing::dynamics {
@@ -36,6 +40,17 @@ constexpr double kContradicted = 0.5;  ///< the most that names are worth which 
 const TorqueGroup& group_of(const TorqueDesign& design, int g) { return design.groups[static_cast<std::size_t>(g)]; }
 
 bool same_name(const TorqueGroup& a, const TorqueGroup& b) { return a.effect == b.effect && a.joints == b.joints; }
+
+/// The choice less links, rotors and loads.
+Choice without_masses(const TorqueDesign& design, const Choice& choice) {
+  Choice out;
+  for (std::size_t k = 0; k < choice.groups.size(); ++k) {
+    if (group_of(design, choice.groups[k]).family == TorqueFamily::inertia) continue;
+    out.groups.push_back(choice.groups[k]);
+    out.scales.push_back(choice.scales[k]);
+  }
+  return out;
+}
 
 /// Everything about one chosen group.
 class Naming {
@@ -103,13 +118,7 @@ class Naming {
   /// Links, rotors and loads that are named beside each other may together be one factor of all drives' constants,
   /// which none of them looks like while the others stay.
   void add_one_scale(double* in_class, std::vector<TorqueAlternative>* confounded) const {
-    Choice rest;
-    for (std::size_t k = 0; k < choice_.groups.size(); ++k) {
-      if (group_of(design_, choice_.groups[k]).family == TorqueFamily::inertia) continue;
-      rest.groups.push_back(choice_.groups[k]);
-      rest.scales.push_back(choice_.scales[k]);
-    }
-    const Evidence::State& less = search_.state(rest);
+    const Evidence::State& less = search_.state(without_masses(design_, choice_));
     for (std::size_t g = 0; g < design_.groups.size(); ++g) {
       const TorqueGroup& other = design_.groups[g];
       const bool one_scale = other.joints.size() > 1 && is_alternative(other) && other.family == TorqueFamily::drive;
@@ -659,14 +668,27 @@ TorqueErrors errors_without_names(const Problem& problem, const Account& account
   return errors_of(problem, {{"usual", problem.nominal.with(valued(*account.design, fit))}}).front();
 }
 
+/// What is asked when these of a choice's groups are named: the choice, and without what their names are judged.
+std::vector<Choice> asked_for(const TorqueDesign& design, const Choice& choice, const std::vector<std::size_t>& at) {
+  std::vector<Choice> out{choice, without_masses(design, choice)};
+  for (const std::size_t k : at) out.push_back(Search::without(choice, k));
+  return out;
+}
+
 /// How sure each of a choice is.
 std::vector<double> sureness(const Account& account) {
+  const Search& search = *account.search;
+  std::vector<double> out(account.choice.groups.size());
+  std::vector<std::size_t> all(out.size());
+  std::iota(all.begin(), all.end(), 0);
+  search.look_ahead(asked_for(*account.design, account.choice, all), Search::Ahead::squares);
+  search.share(account.choice);
   const Naming naming(account);
-  std::vector<double> out;
-  for (std::size_t k = 0; k < account.choice.groups.size(); ++k) {
+  const auto ask = [&](std::size_t k) {
     std::vector<TorqueAlternative> ignored;
-    out.push_back(naming.sure(k, &ignored));
-  }
+    out[k] = naming.sure(k, &ignored);
+  };
+  math::for_each_on_threads(out.size(), search.threads(), {}, ask, 1);
   return out;
 }
 
@@ -681,25 +703,44 @@ bool hides_another(const Account& account, const std::vector<double>& sure, std:
   return false;
 }
 
+/// The first of the unlikely ones that hides another. `sure`: by sureness().
+std::optional<std::size_t> first_that_hides(const Account& account, const std::vector<double>& sure,
+                                            const std::vector<std::size_t>& unlikely) {
+  if (unlikely.size() < 2) return {};
+  std::vector<Choice> asked;
+  for (const std::size_t at : unlikely) {
+    std::vector<std::size_t> others;
+    for (const std::size_t k : unlikely)
+      if (k != at) others.push_back(k < at ? k : k - 1);
+    for (Choice& one : asked_for(*account.design, Search::without(account.choice, at), others))
+      asked.push_back(std::move(one));
+  }
+  account.search->look_ahead(asked, Search::Ahead::squares);
+  std::atomic<std::size_t> first{unlikely.size()};
+  const auto ask = [&](std::size_t k) {
+    if (k > first || !hides_another(account, sure, unlikely[k])) return;
+    for (std::size_t known = first; k < known && !first.compare_exchange_weak(known, k);) {
+    }
+  };
+  math::for_each_on_threads(unlikely.size(), account.search->threads(), {}, ask, 1);
+  if (first == unlikely.size()) return {};
+  return unlikely[first];
+}
+
 }  // namespace
 
 Choice without_what_hides(Account account) {
-  for (bool changed = true; changed;) {
-    changed = false;
+  for (;;) {
     const std::vector<double> sure = sureness(account);
     std::vector<std::size_t> unlikely;
     for (std::size_t k = 0; k < sure.size(); ++k) {
       if (sure[k] < kNamed) unlikely.push_back(k);
     }
     std::sort(unlikely.begin(), unlikely.end(), [&](std::size_t a, std::size_t b) { return sure[a] < sure[b]; });
-    for (const std::size_t at : unlikely) {
-      if (unlikely.size() < 2 || !hides_another(account, sure, at)) continue;
-      account.choice = Search::without(account.choice, at);
-      changed = true;
-      break;
-    }
+    const std::optional<std::size_t> at = first_that_hides(account, sure, unlikely);
+    if (!at) return account.choice;
+    account.choice = Search::without(account.choice, *at);
   }
-  return account.choice;
 }
 
 namespace {

@@ -41,6 +41,9 @@ VectorXd priors_of(const TorqueDesign& design) {
   return out;
 }
 
+constexpr std::size_t kLooksTogether = 2;  ///< that a thread takes
+constexpr std::size_t kTriesTogether = 4;  ///< that are looked at ahead: most are refused
+
 double squares_left(const Gram& gram, const VectorXd& solution) {
   return gram.yy - 2.0 * solution.dot(gram.xy) + solution.dot(gram.xx * solution);
 }
@@ -54,7 +57,11 @@ Search::Search(const TorqueDesign& design, const Sums& sums, std::vector<int> nu
       evidence_(sums_.all, groups_, std::move(nuisance), priors_of(design), estimation::Nuisance::eliminated),
       threads_(threads) {
   const VectorXd flat = evidence_.evaluate({}).precision;
-  for (std::size_t f = 0; f < sums.folds.size(); ++f) folds_.emplace_back(sums, f, evidence_.nuisance(), flat);
+  folds_.resize(sums.folds.size());
+  const auto fit_others = [&](std::size_t f) {
+    folds_[f] = std::make_unique<FoldFit>(sums, f, evidence_.nuisance(), flat);
+  };
+  math::for_each_on_threads(folds_.size(), threads_, {}, fit_others, 1);
   for (const TorqueTerm& term : design.terms) {
     for (const std::size_t j : term.joints) joints_ = std::max(joints_, j + 1);
   }
@@ -135,14 +142,41 @@ double FoldFit::squares(const Evidence::State& state) {
 }
 
 Search::Look& Search::look(const Choice& choice) const {
-  const auto [at, fresh] = looks_.try_emplace({choice.groups, choice.scales});
-  if (fresh) at->second.state = evidence_.evaluate(choice);
-  return at->second;
+  const auto known = looks_.find({choice.groups, choice.scales});
+  if (known != looks_.end()) return known->second;
+  Look& out = looks_[{choice.groups, choice.scales}];
+  out.state = evidence_.evaluate(choice);
+  return out;
 }
 
-const std::vector<Evidence::Gain>& Search::gains(const Choice& choice) const {
+void Search::look_ahead(const std::vector<Choice>& choices, Ahead what) const {
+  if (threads_ == 1) return;
+  std::vector<std::pair<const Choice*, Look*>> fresh;
+  std::vector<Look*> unjudged;
+  for (const Choice& choice : choices) {
+    const auto [at, is_new] = looks_.try_emplace({choice.groups, choice.scales});
+    Look* const look = &at->second;
+    if (is_new) fresh.emplace_back(&choice, look);
+    const bool judged = look->squares.size() > 0 || std::count(unjudged.begin(), unjudged.end(), look) > 0;
+    if (what == Ahead::squares && !judged) unjudged.push_back(look);
+  }
+  const auto evaluate = [&](std::size_t k) { fresh[k].second->state = evidence_.evaluate(*fresh[k].first); };
+  math::for_each_on_threads(fresh.size(), threads_, {}, evaluate, kLooksTogether);
+  // To begin another thread takes as long as to judge one choice.
+  fill_squares(unjudged, unjudged.size() > 1 ? threads_ : 1);
+}
+
+void Search::fill_squares(const std::vector<Look*>& looks, int threads) const {
+  for (Look* look : looks) look->squares.resize(static_cast<Index>(folds_.size()));
+  const auto judge = [&](std::size_t f) {
+    for (Look* look : looks) look->squares[static_cast<Index>(f)] = folds_[f]->squares(look->state);
+  };
+  math::for_each_on_threads(folds_.size(), threads, {}, judge, 1);
+}
+
+const std::vector<Evidence::Gain>& Search::gains(const Choice& choice, int threads) const {
   Look& seen = look(choice);
-  if (seen.gains.empty()) seen.gains = evidence_.gains(seen.state);
+  std::call_once(seen.gains_asked, [&] { seen.gains = evidence_.gains(seen.state, threads); });
   return seen.gains;
 }
 
@@ -161,12 +195,7 @@ std::vector<bool> Search::idle_flights(const Choice& choice) const {
 
 const VectorXd& Search::squares_of_folds(const Choice& choice) const {
   Look& seen = look(choice);
-  if (seen.squares.size() == 0) {
-    seen.squares.resize(static_cast<Index>(folds_.size()));
-    math::for_each_on_threads(
-        folds_.size(), threads_, {},
-        [&](std::size_t f) { seen.squares[static_cast<Index>(f)] = folds_[f].squares(seen.state); }, 1);
-  }
+  if (seen.squares.size() == 0) fill_squares({&seen}, 1);
   return seen.squares;
 }
 
@@ -264,45 +293,58 @@ Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits, bool
     changed = false;
     const Evidence::State& whole = state(choice);
     const VectorXd& squares = squares_of_folds(choice);
+    std::vector<int> asked;
+    std::vector<Choice> less_one;
     for (std::size_t at = 0; at < choice.groups.size(); ++at) {
       // A free function bends to what a law does as well; a law that was named stays, or it would be unknown too.
       if (design_.groups[static_cast<std::size_t>(choice.groups[at])].effect.empty() != free_functions) continue;
-      const Choice less = without(choice, at);
-      const bool possible = !limits.plausible_only || is_plausible(whole, choice.groups[at]);
-      const bool wins = possible && state(less).score < whole.score - 0.5 * limits.threshold;
-      if (wins && predicts(squares_of_folds(less), squares, limits)) continue;
-      choice = less;
+      asked.push_back(choice.groups[at]);
+      less_one.push_back(without(choice, at));
+    }
+    look_ahead(less_one, Ahead::state);
+    const auto wins = [&](std::size_t k) {
+      const bool possible = !limits.plausible_only || is_plausible(whole, asked[k]);
+      return possible && state(less_one[k]).score < whole.score - 0.5 * limits.threshold;
+    };
+    std::size_t winning = 0;  // so many of the first ones
+    while (winning < asked.size() && wins(winning)) ++winning;
+    look_ahead({less_one.begin(), less_one.begin() + static_cast<std::ptrdiff_t>(winning)}, Ahead::squares);
+    for (std::size_t k = 0; k < asked.size() && !changed; ++k) {
+      if (k < winning && predicts(squares_of_folds(less_one[k]), squares, limits)) continue;
+      choice = less_one[k];
       changed = true;
-      break;
     }
   }
   return choice;
 }
 
-Choice Search::run(Choice choice, const SearchLimits& limits, bool free_functions) const {
-  std::vector<int> refused;
-  while (static_cast<int>(choice.groups.size()) < limits.most) {
-    std::vector<Evidence::Gain> ranked = gains(choice);
-    std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
-    const VectorXd& squares = squares_of_folds(choice);
-    bool taken = false;
-    for (const Evidence::Gain& gain : ranked) {
-      if (gain.score < limits.threshold) break;
-      if (!may_enter(choice, gain.group, limits, free_functions)) continue;
-      if (std::find(refused.begin(), refused.end(), gain.group) != refused.end()) continue;
-      const Choice grown = with_one_more(choice, gain.group, gain.scale);
-      const bool possible = !limits.plausible_only || is_plausible(state(grown), gain.group);
-      if (!possible || !predicts(squares, squares_of_folds(grown), limits)) {
-        refused.push_back(gain.group);
-        continue;
-      }
-      choice = std::move(grown);
-      refused.clear();  // beside what is in now they may predict
-      taken = true;
-      break;
+std::optional<Choice> Search::grown(const Choice& choice, const SearchLimits& limits, bool free_functions) const {
+  std::vector<Evidence::Gain> ranked = gains(choice, threads_);
+  std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+  std::vector<Choice> tries;
+  for (const Evidence::Gain& gain : ranked) {
+    if (gain.score < limits.threshold) break;
+    if (may_enter(choice, gain.group, limits, free_functions))
+      tries.push_back(with_one_more(choice, gain.group, gain.scale));
+  }
+  const VectorXd& squares = squares_of_folds(choice);
+  for (std::size_t k = 0; k < tries.size(); ++k) {
+    if (k % kTriesTogether == 0) {
+      const auto first = tries.begin() + static_cast<std::ptrdiff_t>(k);
+      look_ahead({first, first + static_cast<std::ptrdiff_t>(std::min(kTriesTogether, tries.size() - k))},
+                 Ahead::squares);
     }
-    if (!taken) break;
-    choice = better_forms(std::move(choice), limits);
+    const bool possible = !limits.plausible_only || is_plausible(state(tries[k]), tries[k].groups.back());
+    if (possible && predicts(squares, squares_of_folds(tries[k]), limits)) return tries[k];
+  }
+  return {};
+}
+
+Choice Search::run(Choice choice, const SearchLimits& limits, bool free_functions) const {
+  while (static_cast<int>(choice.groups.size()) < limits.most) {
+    std::optional<Choice> more = grown(choice, limits, free_functions);
+    if (!more) break;
+    choice = better_forms(*std::move(more), limits);
   }
   return less_what_is_idle(std::move(choice), limits, free_functions);
 }

@@ -8,6 +8,8 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -75,12 +77,20 @@ class Search {
   /// Takes effects as long as they win; starts from `choice`.
   Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
 
+  enum class Ahead { state, squares };
+  /// Looks at choices side by side: their states, and their squares on folds, are known when somebody asks for them.
+  /// Threads may then ask for them side by side, and, once the largest was shared, for gains of it and of its parts. On
+  /// one thread nothing is looked at before it is asked for; no number depends on it.
+  void look_ahead(const std::vector<Choice>& choices, Ahead what) const;
+  void share(const Choice& largest) const { evidence_.keep_rest(largest); }
+
   const Evidence& evidence() const { return evidence_; }
+  int threads() const { return threads_; }
   double joints() const { return static_cast<double>(joints_); }
   double cost(int group) const { return groups_[static_cast<std::size_t>(group)].cost; }
   const Evidence::State& state(const Choice& choice) const { return look(choice).state; }
   /// What every group would add to it.
-  const std::vector<Evidence::Gain>& gains(const Choice& choice) const;
+  const std::vector<Evidence::Gain>& gains(const Choice& choice, int threads = 1) const;
   /// By column of the design: flights through a play that win nothing, neither beside the choice nor beside what is
   /// always in. They are most of the columns that need a torque, and hardly change with it.
   std::vector<bool> idle_flights(const Choice& choice) const;
@@ -101,11 +111,15 @@ class Search {
   /// A choice that was looked at: naming asks again for what the search has seen.
   struct Look {
     Evidence::State state;
-    std::vector<Evidence::Gain> gains;  ///< empty: not yet asked for
-    Eigen::VectorXd squares;            ///< the same
+    std::once_flag gains_asked;
+    std::vector<Evidence::Gain> gains;
+    Eigen::VectorXd squares;  ///< empty: not yet asked for
   };
   Look& look(const Choice& choice) const;
+  void fill_squares(const std::vector<Look*>& looks, int threads) const;
 
+  /// The choice with the best group that predicts folds; none: no group does.
+  std::optional<Choice> grown(const Choice& choice, const SearchLimits& limits, bool free_functions) const;
   bool may_enter(const Choice& choice, int group, const SearchLimits& limits, bool free_functions) const;
   /// Forms of the effect of group number `at` in its place that explain anything, the best first.
   std::vector<Evidence::Gain> forms_of(const Choice& choice, std::size_t at) const;
@@ -121,7 +135,7 @@ class Search {
   std::vector<ColumnGroup> groups_;
   Evidence evidence_;
   int threads_;
-  mutable std::vector<FoldFit> folds_;
+  std::vector<std::unique_ptr<FoldFit>> folds_;
   mutable std::map<std::pair<std::vector<int>, std::vector<double>>, Look> looks_;  ///< by groups and scales
   std::size_t joints_ = 1;
 };

@@ -256,8 +256,16 @@ std::vector<int> Evidence::factored(const State& state) const {
 
 const Eigen::VectorXd& Evidence::rest_row(int column) const {
   Eigen::VectorXd& out = rest_rows_[static_cast<std::size_t>(column)];
-  if (out.size() == 0) out = gram_.xx.col(column) - always_half_.transpose() * always_half_.col(column);
+  if (out.size() > 0) return out;
+  out = gram_.xx.col(column);  // product by product, so that what is kept has the bits of what is not
+  for (Eigen::Index k = 0; k < out.size(); ++k) out[k] -= always_half_.col(column).dot(always_half_.col(k));
   return out;
+}
+
+void Evidence::keep_rest(const Choice& choice) const {
+  if (eliminated_ == 0) return;
+  for (const int group : choice.groups)
+    for (const int column : groups_[static_cast<std::size_t>(group)].columns) rest_row(column);
 }
 
 Eigen::MatrixXd Evidence::rest(const std::vector<int>& rows, const std::vector<int>& columns) const {
@@ -440,7 +448,6 @@ std::function<double(const std::vector<int>&)> Evidence::explained(const State& 
 
 std::vector<Evidence::Gain> Evidence::gains(const State& state, int threads, std::size_t fewer) const {
   constexpr std::size_t kGroupsAtATime = 16;
-  if (eliminated_ > 0) threads = 1;
   const Projected projected = project(state, threads);
   std::vector<Gain> out(groups_.size());
   const auto one = [&](std::size_t g) {

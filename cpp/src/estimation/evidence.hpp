@@ -100,7 +100,7 @@ class Evidence {
  public:
   /// `nuisance`: columns that are always in, with a flat prior. `prior[k]`: the size that column k's parameter may
   /// have. `gram` and `groups` must outlive it.
-  /// With Nuisance::eliminated no two threads may ask at a time: rows of what is left of the Gram are kept.
+  /// With Nuisance::eliminated rows of what is left of the Gram are kept where gains are asked for: see keep_rest().
   Evidence(const Gram& gram, const std::vector<ColumnGroup>& groups, std::vector<int> nuisance,
            const Eigen::VectorXd& prior, Nuisance treated = Nuisance::in_factor);
   Evidence(const Gram&&, const std::vector<ColumnGroup>&, std::vector<int>, const Eigen::VectorXd&,
@@ -120,6 +120,9 @@ class Evidence {
   };
 
   State evaluate(const Choice& choice) const;
+
+  /// Before several threads ask side by side for gains of this choice, and of parts of it. No number depends on it.
+  void keep_rest(const Choice& choice) const;
 
   /// What adding a group would win.
   struct Gain {

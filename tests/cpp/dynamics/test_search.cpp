@@ -155,3 +155,18 @@ TEST_CASE("a form that no machine has takes no place where one that machines hav
 TEST_CASE("what a form that no machine has explains far better is something else") {
   CHECK(TwoForms(1.5).found().empty());
 }
+
+TEST_CASE("choices that were looked at side by side are as those that were looked at one by one") {
+  const TwoForms some(0.5);
+  const std::vector<Choice> choices = {{}, {{0}, {1.0}}, {{1}, {1.0}}, {{0, 1}, {1.0, 0.1}}, {{0}, {1.0}}};
+  const dynamics::Search alone(some.design, some.sums, {}, 1);
+  for (const int threads : {1, 2}) {
+    const dynamics::Search together(some.design, some.sums, {}, threads);
+    together.look_ahead(choices, dynamics::Search::Ahead::squares);
+    for (const Choice& choice : choices) {
+      CAPTURE(choice.groups.size());
+      CHECK(together.squares_of_folds(choice) == alone.squares_of_folds(choice));
+      CHECK(together.state(choice).score == alone.state(choice).score);
+    }
+  }
+}
