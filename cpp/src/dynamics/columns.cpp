@@ -236,7 +236,7 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&,
   };
   if (any(&TorqueTerm::needs_rigid)) fill_rigid(&tile->motion);
   if (any(&TorqueTerm::needs_yielding))
-    fill_yielding(&tile->motion);
+    fill_yielding(&tile->motion, any(&TorqueTerm::needs_inertia));
   else if (any(&TorqueTerm::needs_inertia))
     fill_inertia(&tile->motion);
   std::vector<MatrixXd> made;

@@ -165,7 +165,7 @@ void RigidChain::compile() {
 }
 
 template <typename Run>
-void RigidChain::passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
+void RigidChain::passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd* qd, const Eigen::MatrixXd* qdd,
                         Eigen::Index begin, Eigen::Index end, Run run) const {
   constexpr Eigen::Index kPassRows = 64;  // of a pass: what goes in and the columns of a joint stay in the cache
   thread_local std::vector<double> motions, scratch;
@@ -180,8 +180,9 @@ void RigidChain::passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, con
   for (Eigen::Index first = begin; first < end; first += kPassRows) {
     const Eigen::Index rows = std::min(kPassRows, end - first), all = padded(rows);
     for (Eigen::Index i = 0; i < links(); ++i) {
-      const Eigen::MatrixXd* const tables[3] = {&q, &qd, &qdd};
+      const Eigen::MatrixXd* const tables[3] = {&q, qd, qdd};
       for (std::size_t t = 0; t < 3; ++t) {
+        if (!tables[t]) continue;
         Eigen::Map<Eigen::VectorXd> to(motions.data() + t * plane + static_cast<std::size_t>(i * kPassRows), all);
         to.setConstant(t == 0 ? zero_[i] : 0.0);
         for (Eigen::Index k = 0; k < driven(); ++k) {
@@ -203,7 +204,7 @@ void RigidChain::regressors(const kernel::RigidFunctions& kernel, const Eigen::M
                             Eigen::Index stride) const {
   thread_local std::vector<double*> out;
   out.resize(static_cast<std::size_t>(driven() * links()));
-  passes(q, qd, qdd, begin, end,
+  passes(q, &qd, &qdd, begin, end,
          [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index) {
            for (std::size_t at = 0; at < out.size(); ++at)
              out[at] = blocks[at] ? blocks[at] + (first - begin) : nullptr;
@@ -219,23 +220,31 @@ bool RigidChain::is_near(const Eigen::MatrixXd& q) const {
   return zero_.cwiseAbs().maxCoeff() + coupling_.cwiseAbs().rowwise().sum().maxCoeff() * q.cwiseAbs().maxCoeff() < kFar;
 }
 
-Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
-                                    const Eigen::VectorXd& parameters) const {
-  Eigen::MatrixXd out(q.rows(), driven());
-  thread_local std::vector<double> part;
-  passes(q, qd, qdd, 0, q.rows(),
-         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
-           part.resize(static_cast<std::size_t>(driven() * tile.samples));
-           double* const block = part.data();
-           tile.blocks = &block;
-           tile.column_stride = tile.samples;
-           kernel::rigid_functions().torque(program, tile, parameters.data());
-           out.middleRows(first, rows) = Eigen::Map<const Eigen::MatrixXd>(block, tile.samples, driven()).topRows(rows);
-         });
-  return out;
-}
-
 namespace {
+
+/// Calls run(tile) with blocks that stand in tables of shape (rows, readings), from row `first` on; null: there is
+/// none. Rows that the kernel would fill up, beyond the last one, get room of their own.
+template <typename Run>
+void fill_tables(const std::vector<Eigen::MatrixXd*>& tables, Eigen::Index first, Eigen::Index rows,
+                 kernel::RigidTile tile, Run run) {
+  thread_local std::vector<double> room;
+  thread_local std::vector<double*> blocks;
+  const Eigen::Index readings = tables.front()->cols(), size = readings * tile.samples;
+  const bool fits = rows == tile.samples;
+  tile.column_stride = fits ? tables.front()->rows() : tile.samples;
+  room.resize(std::max(room.size(), tables.size() * static_cast<std::size_t>(size)));
+  blocks.assign(tables.size(), nullptr);
+  for (std::size_t k = 0; k < tables.size(); ++k) {
+    if (tables[k]) blocks[k] = fits ? tables[k]->data() + first : room.data() + static_cast<Eigen::Index>(k) * size;
+  }
+  tile.blocks = blocks.data();
+  run(tile);
+  for (std::size_t k = 0; k < tables.size() && !fits; ++k) {
+    if (tables[k])
+      tables[k]->middleRows(first, rows) =
+          Eigen::Map<const Eigen::MatrixXd>(blocks[k], tile.samples, readings).topRows(rows);
+  }
+}
 
 /// Of every reading, shape=(rows, readings), to be filled. Copies of one would copy what is not there yet.
 std::vector<Eigen::MatrixXd> empty_tables(Eigen::Index rows, Eigen::Index readings) {
@@ -244,56 +253,82 @@ std::vector<Eigen::MatrixXd> empty_tables(Eigen::Index rows, Eigen::Index readin
   return out;
 }
 
+void add_places(std::vector<Eigen::MatrixXd>* tables, std::vector<Eigen::MatrixXd*>* places) {
+  for (Eigen::MatrixXd& table : *tables) places->push_back(&table);
+}
+
 }  // namespace
+
+Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
+                                    const Eigen::VectorXd& parameters) const {
+  Eigen::MatrixXd out(q.rows(), driven());
+  passes(
+      q, &qd, &qdd, 0, q.rows(),
+      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
+        fill_tables({&out}, first, rows, tile, [&](const kernel::RigidTile& there) {
+          kernel::rigid_functions().torque(program, there, parameters.data());
+        });
+      });
+  return out;
+}
+
+Eigen::MatrixXd RigidChain::weights(const Eigen::MatrixXd& q, const Eigen::VectorXd& parameters) const {
+  Eigen::MatrixXd out(q.rows(), driven());
+  passes(
+      q, nullptr, nullptr, 0, q.rows(),
+      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
+        fill_tables({&out}, first, rows, tile, [&](const kernel::RigidTile& there) {
+          kernel::rigid_functions().weight(program, there, parameters.data());
+        });
+      });
+  return out;
+}
 
 std::vector<Eigen::MatrixXd> RigidChain::mass_matrices(const Eigen::MatrixXd& q,
                                                        const Eigen::VectorXd& parameters) const {
   const Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(q.rows(), q.cols());
   std::vector<Eigen::MatrixXd> out = empty_tables(q.rows(), driven());
-  thread_local std::vector<double> part;
-  passes(q, rest, rest, 0, q.rows(),
-         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
-           part.resize(static_cast<std::size_t>(driven() * driven() * tile.samples));
-           double* const block = part.data();
-           tile.blocks = &block;
-           tile.column_stride = tile.samples;
-           kernel::rigid_functions().mass_matrix(program, tile, parameters.data());
-           const Eigen::Map<const Eigen::MatrixXd> all(block, tile.samples, driven() * driven());
-           for (Eigen::Index k = 0; k < driven(); ++k)
-             out[static_cast<std::size_t>(k)].middleRows(first, rows) =
-                 all.middleCols(k * driven(), driven()).topRows(rows);
-         });
+  std::vector<Eigen::MatrixXd*> places;
+  add_places(&out, &places);
+  passes(
+      q, &rest, &rest, 0, q.rows(),
+      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
+        fill_tables(places, first, rows, tile, [&](const kernel::RigidTile& there) {
+          kernel::rigid_functions().mass_matrix(program, there, parameters.data());
+        });
+      });
   return out;
 }
 
 RigidChain::Changes RigidChain::torque_changes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd,
                                                const Eigen::MatrixXd& qdd, const Eigen::VectorXd& parameters,
                                                const Eigen::MatrixXd& dq, const Eigen::MatrixXd& dqd,
-                                               const Eigen::MatrixXd& dqdd) const {
-  Changes out{empty_tables(q.rows(), driven()), empty_tables(q.rows(), driven())};
-  thread_local std::vector<double> part, change;
-  passes(q, qd, qdd, 0, q.rows(),
-         [&](const kernel::RigidProgram& program, kernel::RigidTile tile, Eigen::Index first, Eigen::Index rows) {
-           change.assign(static_cast<std::size_t>(3 * driven() * tile.stride), 0.0);
-           double* to = change.data();
-           for (const Eigen::MatrixXd* const table : {&dq, &dqd, &dqdd}) {
-             for (Eigen::Index k = 0; k < driven(); ++k, to += tile.stride)
-               std::copy_n(table->col(k).data() + first, rows, to);
-           }
-           const Eigen::Index columns = driven() * driven();
-           part.resize(static_cast<std::size_t>(2 * columns * tile.samples));
-           double* const blocks[] = {part.data(), part.data() + columns * tile.samples};
-           tile.blocks = blocks;
-           tile.column_stride = tile.samples;
-           kernel::rigid_functions().torque_change(program, tile, parameters.data(), change.data());
-           const Eigen::Map<const Eigen::MatrixXd> torques(blocks[0], tile.samples, columns),
-               masses(blocks[1], tile.samples, columns);
-           for (Eigen::Index k = 0; k < driven(); ++k) {
-             const auto at = static_cast<std::size_t>(k);
-             out.torques[at].middleRows(first, rows) = torques.middleCols(k * driven(), driven()).topRows(rows);
-             out.masses[at].middleRows(first, rows) = masses.middleCols(k * driven(), driven()).topRows(rows);
-           }
-         });
+                                               const Eigen::MatrixXd& dqdd, bool with_masses) const {
+  Changes out;
+  std::vector<Eigen::MatrixXd*> places;
+  out.torques = empty_tables(q.rows(), driven());
+  add_places(&out.torques, &places);
+  if (with_masses) {
+    out.masses = empty_tables(q.rows(), driven());
+    add_places(&out.masses, &places);
+  }
+  places.resize(2 * static_cast<std::size_t>(driven()), nullptr);
+  thread_local std::vector<double> change;
+  passes(
+      q, &qd, &qdd, 0, q.rows(),
+      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
+        change.resize(static_cast<std::size_t>(3 * driven() * tile.stride));
+        double* to = change.data();
+        for (const Eigen::MatrixXd* const table : {&dq, &dqd, &dqdd}) {
+          for (Eigen::Index k = 0; k < driven(); ++k, to += tile.stride) {
+            std::copy_n(table->col(k).data() + first, rows, to);
+            std::fill(to + rows, to + tile.samples, 0.0);
+          }
+        }
+        fill_tables(places, first, rows, tile, [&](const kernel::RigidTile& there) {
+          kernel::rigid_functions().torque_change(program, there, parameters.data(), change.data());
+        });
+      });
   return out;
 }
 

@@ -46,26 +46,29 @@ class RigidChain {
   /// The regressor of every row times `parameters` (10 * links), without forming it: shape=(rows, driven).
   Eigen::MatrixXd torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
                           const Eigen::VectorXd& parameters) const;
+  /// The same at rest.
+  Eigen::MatrixXd weights(const Eigen::MatrixXd& q, const Eigen::VectorXd& parameters) const;
   /// The mass matrix of links with these parameters in every row: column k of it, shape=(rows, driven), at place k.
   std::vector<Eigen::MatrixXd> mass_matrices(const Eigen::MatrixXd& q, const Eigen::VectorXd& parameters) const;
   /// What these torques change by, to first order, where a reading's motion is another by `dq` and its derivatives,
   /// shape=(rows, driven) each: for a change of reading k's motion alone those of all readings, shape=(rows, driven),
-  /// at place k. Found on the way: mass_matrices().
+  /// at place k. Found on the way, where they are wanted: mass_matrices().
   struct Changes {
     std::vector<Eigen::MatrixXd> torques, masses;
   };
   Changes torque_changes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
                          const Eigen::VectorXd& parameters, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& dqd,
-                         const Eigen::MatrixXd& dqdd) const;
+                         const Eigen::MatrixXd& dqdd, bool with_masses = true) const;
   static constexpr Eigen::Index padded(Eigen::Index rows) {
     return (rows + kernel::kSampleMultiple - 1) / kernel::kSampleMultiple * kernel::kSampleMultiple;
   }
 
  private:
   void compile();
-  /// Calls run(program, tile, first, rows) with what moves in rows first to first + rows, a cacheful at a time.
+  /// Calls run(program, tile, first, rows) with what moves in rows first to first + rows, a cacheful at a time. Null:
+  /// nobody looks at it.
   template <typename Run>
-  void passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd, Eigen::Index begin,
+  void passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd* qd, const Eigen::MatrixXd* qdd, Eigen::Index begin,
               Eigen::Index end, Run run) const;
 
   struct Link {

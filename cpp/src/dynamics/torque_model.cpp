@@ -40,10 +40,11 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
 
 void fill_inertia(Motion* motion) { motion->inertia = mass_matrix_columns(*motion->robot, motion->q, motion->bodies); }
 
-void fill_yielding(Motion* motion) {
+void fill_yielding(Motion* motion, bool with_inertia) {
   const MatrixXd dq = -motion->torque, dqd = rate_of(dq, motion->step), dqdd = rate_of(dqd, motion->step);
   RigidChain::Changes changes =
-      RigidChain(*motion->robot).torque_changes(motion->q, motion->qd, motion->qdd, motion->bodies, dq, dqd, dqdd);
+      RigidChain(*motion->robot)
+          .torque_changes(motion->q, motion->qd, motion->qdd, motion->bodies, dq, dqd, dqdd, with_inertia);
   motion->yielding = std::move(changes.torques);
   motion->inertia = std::move(changes.masses);
 }
@@ -135,7 +136,7 @@ MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
     motion->torque = out;
   }
   if (any(&TorqueTerm::needs_yielding))
-    fill_yielding(motion);
+    fill_yielding(motion, any(&TorqueTerm::needs_inertia));
   else if (any(&TorqueTerm::needs_inertia))
     fill_inertia(motion);
   add_terms(terms_, true, *motion, &out);

@@ -30,7 +30,7 @@ void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, cons
 
 /// Make Motion::inertia, of Motion::bodies, and Motion::yielding, with which Motion::inertia is found.
 void fill_inertia(Motion* motion);
-void fill_yielding(Motion* motion);
+void fill_yielding(Motion* motion, bool with_inertia);
 /// And Motion::rigid: they are large, and soon made again.
 void clear_tables(Motion* motion);
 

@@ -177,6 +177,69 @@ void torque(const RigidProgram& program, const RigidTile& tile, const double* pa
   });
 }
 
+/// Where a frame is, in the axes of the base.
+struct Standing {
+  Vec x, y, z, o;  ///< columns of R, origin
+
+  Vec turned(Vec v) const { return v.x * x + v.y * y + v.z * z; }
+  void pass(const double* frame) {
+    o = o + turned(splat_vec(frame + 9));
+    const Vec new_x = turned(splat_vec(frame)), new_y = turned(splat_vec(frame + 3));
+    z = turned(splat_vec(frame + 6));
+    x = new_x;
+    y = new_y;
+  }
+  void turn(Pack angle) {
+    Pack s, c;
+    sine_cosine(angle, &s, &c);
+    const Vec old_x = x;
+    x = c * x + s * y;
+    y = c * y - s * old_x;
+  }
+};
+
+/// What gravity asks of the joints, of the mass and first moment of all that is behind each.
+void weight(const RigidProgram& program, const RigidTile& tile, const double* parameters) {
+  const Pack zero{}, one = splat(1.0);
+  const int links = program.link_count, driven = program.driven_count;
+  const Vec gravity = splat_vec(program.gravity);
+  const auto place = [&](int i) { return tile.scratch + 9 * kLanes * i; };  // axis, origin, first moment of its link
+  for (int first = 0; first < tile.samples; first += kLanes) {
+    Standing at{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}, {zero, zero, zero}};
+    for (int i = 0; i < links; ++i) {
+      const RigidLink& link = program.links[i];
+      const double* const p = parameters + kLinkColumns * i;
+      const Pack motion = load(tile.motion + i * tile.stride + first);
+      if (link.moves_before) at.pass(link.before);
+      store_lanes(place(i), at.z);
+      store_lanes(place(i) + 3 * kLanes, at.o);
+      if (link.revolute)
+        at.turn(motion);
+      else
+        at.o = at.o + motion * at.z;
+      if (link.moves_after) at.pass(link.after);
+      store_lanes(place(i) + 6 * kLanes, at.turned(splat_vec(p + 1)) + splat(p[0]) * at.o);
+    }
+    double* const out = tile.blocks[0] + first;
+    for (int k = 0; k < driven; ++k) store(out + k * tile.column_stride, zero);
+    Vec moment{zero, zero, zero};
+    Pack mass = zero;
+    for (int i = links - 1; i >= 0; --i) {
+      moment = moment + load_lanes(place(i) + 6 * kLanes);
+      mass = mass + splat(parameters[kLinkColumns * i]);
+      const Vec axis = load_lanes(place(i)), o = load_lanes(place(i) + 3 * kLanes);
+      const Vec way = program.links[i].revolute ? cross(axis, moment - mass * o) : mass * axis;  // of what is behind it
+      const Pack felt = dot(gravity, way);
+      for (int k = 0; k < driven; ++k) {
+        const double by = program.coupling[i * driven + k];
+        if (by == 0.0) continue;
+        double* const torque = out + k * tile.column_stride;
+        store(torque, load(torque) - splat(by) * felt);
+      }
+    }
+  }
+}
+
 /// What an acceleration of one of every reading asks of a link at rest, in the link's axes, and the work that it does
 /// along every reading: M = sum of J^T I J over the links.
 inline void add_masses(const RigidProgram& program, const RigidTile& tile, int i, int first, const Moving& at,
@@ -196,8 +259,8 @@ inline void add_masses(const RigidProgram& program, const RigidTile& tile, int i
     const Vec moment = cross(moment_of_mass, v) + times_inertia(p + 4, n);
     for (int l = 0; l <= k; ++l) {
       const double* other = local + 6 * kLanes * l;
-      double* out = tile.blocks[0] + (k * driven + l) * tile.column_stride + first;
-      double* mirrored = tile.blocks[0] + (l * driven + k) * tile.column_stride + first;
+      double* out = tile.blocks[k] + l * tile.column_stride + first;
+      double* mirrored = tile.blocks[l] + k * tile.column_stride + first;
       const Pack sum =
           (i > 0 ? load(out) : Pack{}) + dot(load_lanes(other), moment) + dot(load_lanes(other + 3 * kLanes), force);
       store(out, sum);
@@ -360,7 +423,7 @@ inline void add_change(const RigidProgram& program, const RigidTile& tile, int m
       if (follows == 0.0) continue;
       const std::ptrdiff_t column = k * tile.column_stride;
       store(changes + column, load(changes + column) + splat(follows) * felt);
-      store(masses + column, load(masses + column) + splat(follows) * mass);
+      if (masses) store(masses + column, load(masses + column) + splat(follows) * mass);
     }
   }
 }
@@ -370,12 +433,11 @@ void torque_change(const RigidProgram& program, const RigidTile& tile, const dou
   const auto add_changes = [&](int first) {
     add_up_bodies(program, tile);
     for (int k = 0; k < driven; ++k) {
-      const std::ptrdiff_t column = k * driven * tile.column_stride + first;
-      double* const changes = tile.blocks[0] + column;
-      double* const masses = tile.blocks[1] + column;
+      double* const changes = tile.blocks[k] + first;
+      double* const masses = tile.blocks[driven + k] ? tile.blocks[driven + k] + first : nullptr;
       for (int l = 0; l < driven; ++l) {
         store(changes + l * tile.column_stride, Pack{});
-        store(masses + l * tile.column_stride, Pack{});
+        if (masses) store(masses + l * tile.column_stride, Pack{});
       }
       Pack of_reading[3];
       for (int d = 0; d < 3; ++d) of_reading[d] = load(change + (d * driven + k) * tile.stride + first);
@@ -419,6 +481,6 @@ void sine_cosine_of(const double* angle, int count, double* sine, double* cosine
 #define TRUING_TEXT(x) TRUING_TEXT_OF(x)
 extern const RigidFunctions rigid_table;
 const RigidFunctions rigid_table{
-    TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque, mass_matrix, torque_change, sine_cosine_of};
+    TRUING_TEXT(TRUING_KERNEL_NAMESPACE), regressor, torque, weight, mass_matrix, torque_change, sine_cosine_of};
 
 }  // namespace truing::kernel::TRUING_KERNEL_NAMESPACE

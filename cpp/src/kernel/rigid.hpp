@@ -49,11 +49,14 @@ struct RigidFunctions {
   void (*regressor)(const RigidProgram&, const RigidTile&);
   /// The regressor times `parameters`, ten for each link, without its columns.
   void (*torque)(const RigidProgram&, const RigidTile&, const double* parameters);
-  /// The mass matrix of links with these parameters: at blocks[0] driven * driven columns, row by row of the matrix.
+  /// The same at rest, of a few numbers a link: `rate` and `acceleration` are not looked at.
+  void (*weight)(const RigidProgram&, const RigidTile&, const double* parameters);
+  /// The mass matrix of links with these parameters: row k of the matrix at blocks[k], one column for each driven
+  /// joint.
   void (*mass_matrix)(const RigidProgram&, const RigidTile&, const double* parameters);
   /// What these torques change by, to first order, where a reading's motion is another. `change`: [3][driven][stride],
-  /// of each reading's angle, rate and acceleration; at blocks[0] driven * driven columns: for a change of the first
-  /// reading's motion alone the torques of all, then for one of the second's. At blocks[1] the mass matrix, as above.
+  /// of each reading's angle, rate and acceleration; at blocks[k] for a change of reading k's motion alone the torques
+  /// of all, one column for each. At blocks[driven + k] the mass matrix, as above; null: it is not wanted.
   void (*torque_change)(const RigidProgram&, const RigidTile&, const double* parameters, const double* change);
   /// Of `count` angles below 1e5 rad, a multiple of kSampleMultiple; one of the outputs may be the input.
   void (*sine_cosine)(const double* angle, int count, double* sine, double* cosine);

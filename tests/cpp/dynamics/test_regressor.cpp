@@ -233,6 +233,20 @@ TEST_CASE("torques without the regressor are those by it, on every kind of robot
   }
 }
 
+TEST_CASE("weights are the torques at rest, on every kind of robot") {
+  std::mt19937_64 random(30);
+  for (const Robot& robot : robots()) {
+    CAPTURE(robot.name);
+    const RigidChain chain(robot);
+    const States states(chain, 75, &random);
+    const VectorXd parameters = random_vector(kLinkParameters * chain.links(), 1.0, &random);
+    const MatrixXd rest = MatrixXd::Zero(75, chain.driven());
+    const MatrixXd expected = chain.torques(states.q, rest, rest, parameters);
+    const MatrixXd found = chain.weights(states.q, parameters);
+    CHECK((found - expected).cwiseAbs().maxCoeff() <= 1e-12 * expected.cwiseAbs().maxCoeff());
+  }
+}
+
 TEST_CASE("a column of the mass matrix is what an acceleration of one takes at rest, without gravity") {
   std::mt19937_64 random(28);
   for (Robot robot : robots()) {
@@ -265,6 +279,10 @@ TEST_CASE("torques change with a reading's motion as their differences do, on ev
         chain.torque_changes(states.q, states.qd, states.qdd, parameters, change.q, change.qd, change.qdd);
     const std::vector<MatrixXd> masses = chain.mass_matrices(states.q, parameters);
     REQUIRE(found.torques.size() == static_cast<std::size_t>(chain.driven()));
+    const RigidChain::Changes alone =
+        chain.torque_changes(states.q, states.qd, states.qdd, parameters, change.q, change.qd, change.qdd, false);
+    CHECK(alone.torques == found.torques);
+    CHECK(alone.masses.empty());
     for (Index k = 0; k < chain.driven(); ++k) {
       const auto torques = [&](double part) {
         States moved = states;

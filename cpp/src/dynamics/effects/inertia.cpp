@@ -121,8 +121,7 @@ std::vector<TorqueForm> payload_place(const Robot& robot, std::size_t, const Mot
 MatrixXd weight_turned(const Motion& m, int axis) {
   Robot turned = *m.robot;
   turned.gravity = -Eigen::Vector3d::Unit(axis).cross(m.robot->gravity);
-  const MatrixXd rest = MatrixXd::Zero(m.rows(), m.q.cols());
-  return RigidChain(turned).torques(m.q, rest, rest, m.bodies);
+  return RigidChain(turned).weights(m.q, m.bodies);
 }
 
 // A base that does not stand as the file has it. About the vertical nothing changes.

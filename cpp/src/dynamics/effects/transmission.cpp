@@ -184,12 +184,11 @@ TorqueForm backlash_with(const Robot& robot, std::size_t joint, const std::map<s
 MatrixXd held_against(const Motion& m, int axis) {
   Robot robot = *m.robot;
   robot.gravity = Eigen::Vector3d::Unit(axis);
-  const MatrixXd rest = MatrixXd::Zero(m.rows(), m.q.cols());
   VectorXd mass = VectorXd::Zero(kLinkParameters * static_cast<Index>(robot.joints.size()));
   mass[mass.size() - kLinkParameters] = 1.0;
   if (!robot.targets.empty())
     mass.segment<3>(mass.size() - kLinkParameters + 1) = robot.targets[0].T_last_target.translation();
-  return RigidChain(robot).torques(m.q, rest, rest, mass);
+  return RigidChain(robot).weights(m.q, mass);
 }
 
 // A cable or hose: a constant force at the tool.
