@@ -272,7 +272,7 @@ namespace {
 MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
   if (model.needs_rigid()) fill_rigid(&tile->motion);
   set_direction(model.turns(), tile);
-  MatrixXd out = model.torque_by_direction(&tile->motion);
+  MatrixXd out = model.torque_by_direction(&tile->motion, &tile->memory.undirected);
   clear_tables(&tile->motion);
   return out;
 }
@@ -281,6 +281,8 @@ MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
 
 void set_direction(const std::vector<FrictionTurn>& turns, Tile* tile) {
   Motion& motion = tile->motion;
+  if (same(tile->memory.turns, turns)) return;
+  tile->memory.turns = turns;
   motion.direction.resize(motion.q.rows(), motion.q.cols());
   for (Index j = 0; j < motion.q.cols(); ++j) {
     const FrictionTurn& turn = turns[static_cast<std::size_t>(j)];

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <vector>
 
+#include "dynamics/torque_model.hpp"
 #include "rooms.hpp"
 #include "truing/dynamics/effect.hpp"
 #include "truing/dynamics/recording.hpp"
@@ -25,10 +26,12 @@ constexpr double kSpeedAtRest = 0.01;
 struct TileMemory {
   /// By joint, speed, travel and fading of a turn: directions at every row of the motion.
   std::map<std::tuple<Eigen::Index, double, double, double>, Eigen::VectorXd> directions;
+  std::vector<FrictionTurn> turns;  ///< those of Motion::direction as it is
   /// Filtered columns of the inertial parameters, in the tile's own rows: by joint, those of the links that it feels.
   std::vector<Eigen::MatrixXd> links;
-  std::uint64_t model = 0;  ///< TorqueModel::number() of `torque`
-  Eigen::MatrixXd torque;   ///< in the tile's own rows
+  UndirectedTorque undirected;  ///< at every row of the motion
+  std::uint64_t model = 0;      ///< TorqueModel::number() of `torque`
+  Eigen::MatrixXd torque;       ///< in the tile's own rows
 };
 
 /// A stretch of a recording. Basis functions see every row of `motion`; the fit sees every `stride`-th row of what they

@@ -11,6 +11,7 @@
 #include "dynamics/effects/families.hpp"
 #include "dynamics/payload.hpp"
 #include "dynamics/physical.hpp"
+#include "dynamics/turn.hpp"
 #include "math/batch.hpp"
 #include "math/linear_algebra.hpp"
 #include "math/text.hpp"
@@ -626,12 +627,6 @@ void choose_turns(Problem* problem, bool may_fade, const std::function<std::vect
     }
   }
   set(chosen);
-}
-
-bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
-    return one.speed == other.speed && one.travel == other.travel && one.fade == other.fade;
-  });
 }
 
 }  // namespace

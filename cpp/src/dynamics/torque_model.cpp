@@ -28,15 +28,27 @@ std::vector<ValuedTerm> valued_terms(const Robot& robot, const MotionRange& rang
   return out;
 }
 
-void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, const Motion& motion, MatrixXd* torque) {
+namespace {
+
+enum class TermKind { undirected, directed, needs_torque };
+
+TermKind kind_of(const TorqueTerm& term) {
+  if (term.needs_torque) return TermKind::needs_torque;
+  return term.needs_direction ? TermKind::directed : TermKind::undirected;
+}
+
+/// Adds value * basis of every term of this kind to `torque`, shape=(rows, joints).
+void add_terms(const std::vector<ValuedTerm>& terms, TermKind kind, const Motion& motion, MatrixXd* torque) {
   for (const ValuedTerm& valued : terms) {
-    if (valued.term.needs_torque != that_need_torque || valued.value == 0.0) continue;
+    if (kind_of(valued.term) != kind || valued.value == 0.0) continue;
     const MatrixXd columns = valued.term.basis(motion);
     if (columns.rows() == 0) continue;
     for (std::size_t k = 0; k < valued.term.joints.size(); ++k)
       torque->col(static_cast<Index>(valued.term.joints[k])) += valued.value * columns.col(static_cast<Index>(k));
   }
 }
+
+}  // namespace
 
 void fill_inertia(Motion* motion) { motion->inertia = mass_matrix_columns(*motion->robot, motion->q, motion->bodies); }
 
@@ -86,7 +98,7 @@ void TorqueModel::add(std::vector<ValuedTerm> more) {
 TorqueModel TorqueModel::with(const std::vector<ValuedTerm>& more) const {
   TorqueModel out = *this;
   out.add(more);
-  out.number_ = next_number();
+  out.number_ = out.undirected_number_ = next_number();
   return out;
 }
 
@@ -110,14 +122,26 @@ TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
   return out;
 }
 
-MatrixXd TorqueModel::torque_of_others(Motion* motion) const {
+MatrixXd TorqueModel::torque_of_others(Motion* motion, UndirectedTorque* kept) const {
   if (motion->bodies.size() != links_.size() || motion->bodies != links_) {  // else it is known what is carried
     motion->carried = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
     add_payload(*motion, &motion->carried);
     motion->bodies = links_;
   }
-  MatrixXd out = motion->carried + motion->qdd * rotors_;  // it is symmetric
-  add_terms(terms_, false, *motion, &out);
+  MatrixXd out;
+  if (kept && kept->of == undirected_number_) {
+    out = kept->torque;
+  } else {
+    out = undirected_torque(*motion);
+    if (kept) *kept = {undirected_number_, out};
+  }
+  add_terms(terms_, TermKind::directed, *motion, &out);
+  return out;
+}
+
+MatrixXd TorqueModel::undirected_torque(const Motion& motion) const {
+  MatrixXd out = motion.carried + motion.qdd * rotors_;  // it is symmetric
+  add_terms(terms_, TermKind::undirected, motion, &out);
   return out;
 }
 
@@ -126,9 +150,11 @@ MatrixXd TorqueModel::torque(Motion* motion) const {
   return torque_by_direction(motion);
 }
 
-MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
-  MatrixXd out = torque_of_others(motion);
-  if (seen_) {
+MatrixXd TorqueModel::torque_by_direction(Motion* motion, UndirectedTorque* kept) const {
+  MatrixXd out = torque_of_others(motion, kept);
+  if (seen_ && same(seen_->turns_, turns_)) {
+    motion->torque = seen_->torque_of_others(motion);
+  } else if (seen_) {
     const MatrixXd mine = std::exchange(motion->direction, directions_of(*motion, seen_->turns_));
     motion->torque = seen_->torque_of_others(motion);
     motion->direction = mine;
@@ -139,7 +165,7 @@ MatrixXd TorqueModel::torque_by_direction(Motion* motion) const {
     fill_yielding(motion, any(&TorqueTerm::needs_inertia));
   else if (any(&TorqueTerm::needs_inertia))
     fill_inertia(motion);
-  add_terms(terms_, true, *motion, &out);
+  add_terms(terms_, TermKind::needs_torque, *motion, &out);
   return out;
 }
 

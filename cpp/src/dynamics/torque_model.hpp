@@ -24,15 +24,18 @@ struct ValuedTerm {
 std::vector<ValuedTerm> valued_terms(const Robot& robot, const MotionRange& range,
                                      const std::vector<TorqueEffect>& own);
 
-/// Adds value * basis of every term that needs (or does not need) Motion::torque to `torque`, shape=(rows, joints).
-void add_terms(const std::vector<ValuedTerm>& terms, bool that_need_torque, const Motion& motion,
-               Eigen::MatrixXd* torque);
-
-/// Make Motion::inertia, of Motion::bodies, and Motion::yielding, with which Motion::inertia is found.
+/// Make Motion::inertia, of Motion::bodies, and Motion::yielding, with which Motion::inertia is found where it is
+/// wanted.
 void fill_inertia(Motion* motion);
 void fill_yielding(Motion* motion, bool with_inertia);
 /// And Motion::rigid: they are large, and soon made again.
 void clear_tables(Motion* motion);
+
+/// Torques of a model but for its terms that look at the direction of friction or ask for the torque.
+struct UndirectedTorque {
+  std::uint64_t of = 0;  ///< number that models share which differ in how friction turns alone
+  Eigen::MatrixXd torque;
+};
 
 /// A robot's torques with the payload that the recording states, and a correction beside them.
 class TorqueModel {
@@ -51,8 +54,8 @@ class TorqueModel {
   /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::direction to what this robot's friction knows of
   /// it, and Motion::torque to what the terms that ask for it see: the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
-  /// The same where Motion::direction is set already.
-  Eigen::MatrixXd torque_by_direction(Motion* motion) const;
+  /// The same where Motion::direction is set already. `kept`: of this motion, from before and for the next time.
+  Eigen::MatrixXd torque_by_direction(Motion* motion, UndirectedTorque* kept = nullptr) const;
 
   const std::vector<FrictionTurn>& turns() const { return turns_; }
   /// Models of one number have the same torques.
@@ -65,7 +68,9 @@ class TorqueModel {
 
  private:
   /// Of all but the terms that ask for the torque, by Motion::direction.
-  Eigen::MatrixXd torque_of_others(Motion* motion) const;
+  Eigen::MatrixXd torque_of_others(Motion* motion, UndirectedTorque* kept = nullptr) const;
+  /// Of these the links, the rotors and the terms that do not look at the direction.
+  Eigen::MatrixXd undirected_torque(const Motion& motion) const;
   void add(std::vector<ValuedTerm> more);
   bool any(bool TorqueTerm::* needs) const;
 
@@ -77,6 +82,7 @@ class TorqueModel {
   std::vector<FrictionTurn> turns_;
   std::shared_ptr<const TorqueModel> seen_;  ///< null: itself
   std::uint64_t number_;
+  std::uint64_t undirected_number_ = number_;  ///< models that differ in how friction turns alone share it
 };
 
 }  // namespace truing::dynamics

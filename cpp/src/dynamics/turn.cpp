@@ -82,6 +82,12 @@ VectorXd direction_of(const Motion& motion, Index joint, const FrictionTurn& tur
   return stop_operator(motion.q.col(joint), turn.travel, kept);
 }
 
+bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const FrictionTurn& one, const FrictionTurn& other) {
+    return one.speed == other.speed && one.travel == other.travel && one.fade == other.fade;
+  });
+}
+
 MatrixXd directions_of(const Motion& motion, const std::vector<FrictionTurn>& turns) {
   MatrixXd out(motion.q.rows(), motion.q.cols());
   for (Index j = 0; j < out.cols(); ++j) out.col(j) = direction_of(motion, j, turns[static_cast<std::size_t>(j)]);

@@ -22,6 +22,8 @@ Eigen::VectorXd direction_by_speed(const Eigen::Ref<const Eigen::VectorXd>& qd, 
 /// The same of one joint, by the speed or by the travel.
 Eigen::VectorXd direction_of(const Motion& motion, Eigen::Index joint, const FrictionTurn& turn);
 
+bool same(const std::vector<FrictionTurn>& a, const std::vector<FrictionTurn>& b);
+
 /// Motion::direction where friction turns so at every joint.
 Eigen::MatrixXd directions_of(const Motion& motion, const std::vector<FrictionTurn>& turns);
 
