@@ -190,14 +190,13 @@ VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
 
 /// What was chosen beside the file's inertias, beside inertias that are all free: single links may explain torques only
 /// with masses that no body has, and what else was chosen bends to the nearest that one can have. None where bodies
-/// predict folds as well without. `grams`: those of `given`.
-std::shared_ptr<const Account> freed(const Problem& problem, const TorqueGrams& grams, const std::vector<Noise>& noise,
-                                     const Account& given, double least_gain) {
+/// predict folds as well without.
+std::shared_ptr<const Account> freed(const Problem& problem, const Account& given, double least_gain) {
   const TorqueDesign& design = *given.design;
   const int threads = problem.tiles.threads();
-  auto out = std::make_shared<Account>(account_of(given.design,
-                                                  sums_of(grams, noise, design, inertial_columns(design), threads),
-                                                  standard_columns(design), threads));
+  // The sums of given inertias have no priors.
+  auto out = std::make_shared<Account>(account_of(
+      given.design, with_priors(*given.sums, design, inertial_columns(design)), standard_columns(design), threads));
   for (std::size_t k = 0; k < given.choice.groups.size(); ++k) {
     if (is_inertial(design.groups[static_cast<std::size_t>(given.choice.groups[k])])) continue;
     out->choice.groups.push_back(given.choice.groups[k]);
@@ -210,36 +209,34 @@ std::shared_ptr<const Account> freed(const Problem& problem, const TorqueGrams& 
 
 // The file's inertias as they are, and single links, rotors, loads that differ from it: where that predicts folds as
 // well as inertias that are all free, it says more with less. What free inertias take up is named here.
-// `seen`: the model of the free ones.
-std::optional<Account> of_given_inertias(const Problem& problem, const DesignColumns& columns, const TorqueGrams& grams,
+// `flat`: sums of `columns`; `seen`: the model of the free ones.
+std::optional<Account> of_given_inertias(const Problem& problem, const DesignColumns& columns, Sums flat,
                                          const TorqueModel& seen, const std::vector<Noise>& noise, const Account& free,
                                          const SearchLimits& limits) {
   SearchLimits more = limits;
   more.most = static_cast<int>(free.choice.groups.size() + problem.robot.driven_count());
   more.masses_given = true;
-  TorqueGrams train = grams;
-  const auto searched = [&](const Choice& start) {
-    const std::vector<bool> none(free.design->terms.size(), false);
-    const int threads = problem.tiles.threads();
-    Account out = account_of(free.design, sums_of(train, noise, *free.design, none, threads),
-                             friction_columns(*free.design), threads);
+  const int threads = problem.tiles.threads();
+  const auto searched = [&](Sums sums, const Choice& start) {
+    Account out = account_of(free.design, std::move(sums), friction_columns(*free.design), threads);
     out.choice = out.search->run(start, more, false);
     out.inertias_given = true;
     return out;
   };
-  Account out = searched(free.choice);
+  const TorqueGrams grams = flat.folds.front().joints();
+  Account out = searched(std::move(flat), free.choice);
   TorqueModel model = seen;
   if (has_constant_of_drive(out)) {
     // Free inertias take a drive's constant up, and its column with it: now it is the torque that the file's give.
     model = fitted_model(problem, out);
-    train =
-        sum_grams(columns, problem.nominal, model, problem.train, {grams, false, out.search->idle_flights(out.choice)});
-    out = searched(out.choice);
+    const TorqueGrams again = sum_grams(columns, problem.nominal, model, problem.train,
+                                        {{grams}, false, out.search->idle_flights(out.choice)});
+    out = searched(flat_sums_of(again, noise, *free.design, threads), out.choice);
   }
   out.choice = without_what_hides(out);
   if (!as_good_as_free(out, free)) return {};
   if (!bodies_can_do_it(problem, out)) return {};
-  out.freed = freed(problem, train, noise, out, limits.least_gain);
+  out.freed = freed(problem, out, limits.least_gain);
   out.held_out = held_out_of(problem, out, model, noise);
   return out;
 }
@@ -332,7 +329,8 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     idle = search.idle_flights(choice);
     if (round + 2 >= kRounds) noise = noise_of(problem.tiles, model, problem.train);
   }
-  Account free = account_of(design, sums_of(grams, noise, *design, priors, options.threads), nuisance, options.threads);
+  Sums flat = flat_sums_of(grams, noise, *design, options.threads);
+  Account free = account_of(design, with_priors(flat, *design, priors), nuisance, options.threads);
   free.choice = choice;
   free.choice = without_what_hides(free);
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {
@@ -341,7 +339,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
     return named(problem, groundwork, account, noise, functions, noise_of_functions, limits.least_gain);
   };
   std::optional<Account> given;
-  if (!problem.fitted_before) given = of_given_inertias(problem, *columns, grams, model, noise, free, limits);
+  if (!problem.fitted_before) given = of_given_inertias(problem, *columns, std::move(flat), model, noise, free, limits);
   columns.reset();  // large
   if (given) {
     TorqueDiagnosis out = answer(*given, fitted_model(problem, *given));

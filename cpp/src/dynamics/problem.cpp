@@ -195,17 +195,25 @@ std::vector<int> standard_columns(const TorqueDesign& design) {
   return out;
 }
 
-Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
-             const std::vector<bool>& with_prior, int threads) {
+Sums flat_sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design, int threads) {
   Sums out;
   for (std::size_t f = 0; f < grams->front().folds.size(); ++f) out.folds.emplace_back(grams, f, noise);
   out.all = sum_of_folds(*grams, noise, design.terms.size(), threads);
   out.precision = VectorXd::Zero(static_cast<Index>(design.terms.size()));
-  for (std::size_t c = 0; c < design.terms.size(); ++c) {
-    if (with_prior[c]) out.precision[static_cast<Index>(c)] = std::pow(design.terms[c].prior, -2.0);
-  }
-  out.all.xx.diagonal() += out.precision;
   return out;
+}
+
+Sums with_priors(Sums flat, const TorqueDesign& design, const std::vector<bool>& with_prior) {
+  for (std::size_t c = 0; c < design.terms.size(); ++c) {
+    if (with_prior[c]) flat.precision[static_cast<Index>(c)] = std::pow(design.terms[c].prior, -2.0);
+  }
+  flat.all.xx.diagonal() += flat.precision;
+  return flat;
+}
+
+Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+             const std::vector<bool>& with_prior, int threads) {
+  return with_priors(flat_sums_of(grams, noise, design, threads), design, with_prior);
 }
 
 Fit fit_of(const Sums& sums, const std::vector<int>& columns, const VectorXd& ridge) {

@@ -55,7 +55,12 @@ struct Sums {
   Eigen::VectorXd precision;  ///< of the priors, by column; 0: flat
 };
 
-/// `with_prior`: by column, whether its term's prior holds; the others are flat.
+/// Without priors: all are flat.
+Sums flat_sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
+                  int threads = 1);
+/// `with_prior`: by column, whether its term's prior holds.
+Sums with_priors(Sums flat, const TorqueDesign& design, const std::vector<bool>& with_prior);
+/// Both.
 Sums sums_of(const TorqueGrams& grams, const std::vector<Noise>& noise, const TorqueDesign& design,
              const std::vector<bool>& with_prior, int threads = 1);
 
