@@ -84,32 +84,43 @@ struct SumOrder {
 class TableSum {
  public:
   Gram of(const MatrixXd& table, const std::vector<Index>& rows, const SumOrder& order) {
-    const auto count = static_cast<Index>(rows.size());
     const auto columns = static_cast<int>(table.cols());
     sums_.resize(std::max(sums_.size(), kernel::functions().gram_size(columns)), 0.0);
     places_.resize(static_cast<std::size_t>(columns));
-    for (Index done = 0; done < count; done += kTogether) {
-      const Index some = std::min(kTogether, count - done), all = RigidChain::padded(some);
-      const Index* const these = rows.data() + done;
-      if (some == all && these[some - 1] == these[0] + some - 1)
-        point_into(table, order, these[0]);
-      else
-        copy(table, order, these, some);
-      kernel::functions().gram_add_columns(places_.data(), columns, static_cast<int>(order.known),
-                                           static_cast<int>(all), sums_.data());
+    const std::vector<Index> rest = add_long_runs(table, rows, order);
+    for (std::size_t done = 0; done < rest.size(); done += kTogether) {
+      const Index some = std::min(kTogether, static_cast<Index>(rest.size() - done));
+      copy(table, order, rest.data() + done, some);
+      add(order, RigidChain::padded(some));
     }
     products_.setZero(columns, columns);
     kernel::functions().gram_reduce(sums_.data(), columns, static_cast<int>(order.known), products_.data());
-    return in_place(order, static_cast<double>(count));
+    return in_place(order, static_cast<double>(rows.size()));
   }
 
  private:
-  /// Rows that follow each other stay where they are.
-  void point_into(const MatrixXd& table, const SumOrder& order, Index first) {
-    for (std::size_t c = 0; c < places_.size(); ++c) places_[c] = table.col(order.columns[c]).data() + first;
+  void add(const SumOrder& order, Index rows) {
+    kernel::functions().gram_add_columns(places_.data(), static_cast<int>(places_.size()),
+                                         static_cast<int>(order.known), static_cast<int>(rows), sums_.data());
+  }
+
+  /// Many rows that follow each other stay where they are. Returns the others.
+  std::vector<Index> add_long_runs(const MatrixXd& table, const std::vector<Index>& rows, const SumOrder& order) {
+    std::vector<Index> rest;
+    find_runs(rows.data(), static_cast<Index>(rows.size()));
+    for (const auto& [first, length] : runs_) {
+      const Index whole = length < kLong ? 0 : length - length % kernel::kSampleMultiple;
+      for (Index done = 0; done < whole; done += kTogether) {
+        for (std::size_t c = 0; c < places_.size(); ++c) places_[c] = table.col(order.columns[c]).data() + first + done;
+        add(order, std::min(kTogether, whole - done));
+      }
+      for (Index i = whole; i < length; ++i) rest.push_back(first + i);
+    }
+    return rest;
   }
 
   void copy(const MatrixXd& table, const SumOrder& order, const Index* rows, Index count) {
+  /// Rows that follow each other are copied together.
     rows_.resize(kTogether, std::max(rows_.cols(), table.cols()));
     find_runs(rows, count);
     for (std::size_t c = 0; c < places_.size(); ++c) {
@@ -121,7 +132,6 @@ class TableSum {
     rows_.middleRows(count, RigidChain::padded(count) - count).setZero();
   }
 
-  /// Rows that follow each other are copied together.
   void find_runs(const Index* rows, Index count) {
     runs_.clear();
     for (Index i = 0; i < count; ++i) {
@@ -135,8 +145,9 @@ class TableSum {
   Gram in_place(const SumOrder& order, double count) const {
     const Index x = products_.cols() - 1;
     Gram out;
-    out.xx = MatrixXd::Zero(x, x);
-    out.xy = VectorXd::Zero(x);
+    out.xx.resize(x, x);
+    for (Index b = 0; b < order.known; ++b) out.xx.col(order.columns[static_cast<std::size_t>(b)]).setZero();
+    out.xy.resize(x);
     for (Index b = order.known; b < x; ++b) {
       const Index column = order.columns[static_cast<std::size_t>(b)];
       for (Index a = 0; a <= b; ++a) {
@@ -150,7 +161,7 @@ class TableSum {
     return out;
   }
 
-  static constexpr Index kTogether = 256;
+  static constexpr Index kTogether = 256, kLong = 64;
   std::vector<const double*> places_;          ///< of the columns, in their order
   std::vector<std::pair<Index, Index>> runs_;  ///< first row, and how many
   MatrixXd rows_;
