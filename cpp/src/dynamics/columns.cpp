@@ -12,6 +12,7 @@
 
 #include "dynamics/regressor.hpp"
 #include "kernel/kernel.hpp"
+#include "math/batch.hpp"
 
 namespace truing::dynamics {
 namespace {
@@ -119,8 +120,8 @@ class TableSum {
     return rest;
   }
 
-  void copy(const MatrixXd& table, const SumOrder& order, const Index* rows, Index count) {
   /// Rows that follow each other are copied together.
+  void copy(const MatrixXd& table, const SumOrder& order, const Index* rows, Index count) {
     rows_.resize(kTogether, std::max(rows_.cols(), table.cols()));
     find_runs(rows, count);
     for (std::size_t c = 0; c < places_.size(); ++c) {
@@ -172,15 +173,32 @@ class TableSum {
 /// Sums of one tile, by joint and fold.
 using TileGrams = std::vector<std::vector<Gram>>;
 
-/// Such rows of a tile, by fold: of these folds, and the torque was measured.
-std::vector<std::vector<Index>> rows_of(const Tile& tile, Index joint, const Folds& folds, Rows rows) {
-  std::vector<std::vector<Index>> out(static_cast<std::size_t>(folds.count));
-  const VectorXd time = tile.own_time();
+bool is_of(Rows rows, const Tile& tile, Index row, Index joint) {
+  switch (rows) {
+    case Rows::fitted:
+      return tile.moving(row, joint) != 0.0;
+    case Rows::resting:
+      return tile.moving(row, joint) == 0.0 && tile.inside(row, joint) != 0.0;
+    case Rows::judged:
+      return true;
+  }
+  return false;
+}
+
+std::vector<int> folds_of(const Tile& tile, const Folds& folds) {
+  std::vector<int> out;
+  for (const double time : tile.own_time()) out.push_back(folds.fold(tile.recording, time));
+  return out;
+}
+
+/// Such rows of a tile, by fold: of these folds, and the torque was measured. `fold`: of every row.
+std::vector<std::vector<Index>> rows_of(const Tile& tile, Index joint, const std::vector<int>& fold, int folds,
+                                        Rows rows) {
+  std::vector<std::vector<Index>> out(static_cast<std::size_t>(folds));
   for (Index i = 0; i < tile.count; ++i) {
-    const bool left_out = rows == Rows::fitted && tile.moving(i, joint) == 0.0;
-    if (left_out || std::isnan(tile.measured(i, joint))) continue;
-    const int fold = folds.fold(tile.recording, time[i]);
-    if (fold >= 0) out[static_cast<std::size_t>(fold)].push_back(i);
+    const int of = fold[static_cast<std::size_t>(i)];
+    if (of >= 0 && is_of(rows, tile, i, joint) && !std::isnan(tile.measured(i, joint)))
+      out[static_cast<std::size_t>(of)].push_back(i);
   }
   return out;
 }
@@ -189,12 +207,13 @@ TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const Matri
                    const std::vector<SumOrder>& orders, Rows which) {
   thread_local TableSum sum;  // its room is large, and clearing pages takes long
   TileGrams out(columns->size(), std::vector<Gram>(static_cast<std::size_t>(folds.count)));
+  const std::vector<int> fold = folds_of(tile, folds);
   for (std::size_t j = 0; j < columns->size(); ++j) {
     const auto joint = static_cast<Index>(j);
     MatrixXd& table = (*columns)[j];
     if (table.rows() == 0) continue;
     table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
-    const std::vector<std::vector<Index>> rows = rows_of(tile, joint, folds, which);
+    const std::vector<std::vector<Index>> rows = rows_of(tile, joint, fold, folds.count, which);
     for (std::size_t f = 0; f < rows.size(); ++f) {
       if (!rows[f].empty()) out[j][f] = sum.of(table, rows[f], orders[j]);
     }
@@ -312,7 +331,8 @@ SumOrder order_of(const TorqueDesign& design, const std::vector<int>& columns, c
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const TorqueTerm& term = design.terms[static_cast<std::size_t>(columns[k])];
     const bool stays = kept && !earlier.idle.empty() && earlier.idle[static_cast<std::size_t>(columns[k])];
-    const bool known = earlier.grams && (!term.needs_torque || stays) && !(earlier.turned && looks_at_direction(term));
+    const bool known =
+        !earlier.grams.empty() && (!term.needs_torque || stays) && !(earlier.turned && looks_at_direction(term));
     (known ? out.columns : others).push_back(static_cast<Index>(k));
   }
   out.known = static_cast<Index>(out.columns.size());
@@ -328,17 +348,37 @@ void add_known(const std::vector<Gram>& earlier, const SumOrder& order, std::vec
   }
 }
 
+/// Of no rows yet.
+std::vector<JointGrams> no_sums(const DesignColumns& columns, const Folds& folds) {
+  std::vector<JointGrams> out;
+  for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j)
+    out.emplace_back(columns.of_joint(j), columns.design().terms.size(), folds.count);
+  return out;
+}
+
+/// What the tile held is gone.
+void add_tile(TileGrams* tile, std::vector<JointGrams>* sums) {
+  for (std::size_t j = 0; j < sums->size(); ++j) {
+    for (std::size_t f = 0; f < (*tile)[j].size(); ++f) {
+      Gram &sum = (*sums)[j].folds[f], &more = (*tile)[j][f];
+      if (sum.xx.size() == 0)
+        sum = std::move(more);
+      else if (more.xx.size() > 0)
+        sum.add(more);
+    }
+  }
+  tile->clear();
+}
+
 }  // namespace
 
-TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                      const Folds& folds, const EarlierSums& earlier, Rows rows) {
-  auto out = std::make_shared<std::vector<JointGrams>>();
+std::vector<TorqueGrams> sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
+                                   const Folds& folds, const EarlierSums& earlier, const std::vector<Rows>& rows) {
+  std::vector<std::vector<JointGrams>> sums(rows.size(), no_sums(columns, folds));
   std::vector<SumOrder> orders;
-  for (std::size_t j = 0; j < columns.tiles().robot().driven_count(); ++j) {
-    out->emplace_back(columns.of_joint(j), columns.design().terms.size(), folds.count);
+  for (std::size_t j = 0; j < sums.front().size(); ++j)
     orders.push_back(order_of(columns.design(), columns.of_joint(j), earlier, columns.are_kept()));
-  }
-  std::vector<TileGrams> lot(Tiles::kTogether);
+  std::vector<std::vector<TileGrams>> lot(Tiles::kTogether, std::vector<TileGrams>(rows.size()));
   const auto work = [&](Tile& tile, std::size_t k) {
     const MatrixXd predicted = kept_torque(subtracted, &tile);
     if (columns.any_needs_torque())
@@ -346,25 +386,40 @@ TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracte
     else
       set_direction(seen.turns(), &tile);
     const auto sum = [&](DesignColumns::Tables& tables) {
-      lot[k] = grams_of(&tables, tile, predicted, folds, orders, rows);
+      for (std::size_t r = 0; r < rows.size(); ++r)
+        lot[k][r] = grams_of(&tables, tile, predicted, folds, orders, rows[r]);
     };
     columns.use(&tile, true, sum, earlier.idle);
   };
   const auto add = [&](std::size_t k) {
-    for (std::size_t j = 0; j < out->size(); ++j) {
-      for (std::size_t f = 0; f < lot[k][j].size(); ++f) {
-        Gram &sum = (*out)[j].folds[f], &more = lot[k][j][f];
-        if (sum.xx.size() == 0)
-          sum = std::move(more);
-        else if (more.xx.size() > 0)
-          sum.add(more);
-      }
-    }
-    lot[k].clear();
+    for (std::size_t r = 0; r < rows.size(); ++r) add_tile(&lot[k][r], &sums[r]);
   };
   columns.tiles().for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; }, work, add);
-  for (std::size_t j = 0; earlier.grams && j < out->size(); ++j)
-    add_known((*earlier.grams)[j].folds, orders[j], &(*out)[j].folds);
+  std::vector<TorqueGrams> out;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const auto complete = [&](std::size_t j) { add_known((*earlier.grams[r])[j].folds, orders[j], &sums[r][j].folds); };
+    if (!earlier.grams.empty()) math::for_each_on_threads(orders.size(), columns.tiles().threads(), {}, complete, 1);
+    out.push_back(std::make_shared<const std::vector<JointGrams>>(std::move(sums[r])));
+  }
+  return out;
+}
+
+std::vector<double> rms_of(const std::vector<TorqueGrams>& rows, const VectorXd& values) {
+  constexpr double kExact = 1e-12;  // of the measured squares: less is rounding
+  std::vector<double> out;
+  for (std::size_t j = 0; j < rows.front()->size(); ++j) {
+    const VectorXd own = values((*rows.front())[j].columns);
+    double squares = 0.0, all = 0.0, n = 0.0;
+    for (const TorqueGrams& grams : rows) {
+      for (const Gram& gram : (*grams)[j].folds) {
+        if (gram.xx.size() == 0) continue;
+        squares += gram.yy - 2.0 * own.dot(gram.xy) + own.dot(gram.xx * own);
+        all += gram.yy;
+        n += gram.n;
+      }
+    }
+    out.push_back(n < 2.0 ? 0.0 : std::sqrt(std::max(squares, kExact * all) / n));
+  }
   return out;
 }
 
@@ -374,7 +429,7 @@ namespace {
 /// not kept, to make every one of them would take longer than to filter what they are together.
 class ErrorsOf {
  public:
-  ErrorsOf(const DesignColumns& columns, const TorqueModel& model, const TorqueModel& seen, const VectorXd& values)
+  ErrorsOf(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values)
       : columns_(columns), model_(model), values_(values) {
     if (columns.are_kept()) return;
     std::vector<ValuedTerm> terms;
@@ -384,7 +439,7 @@ class ErrorsOf {
     }
     fitted_ = std::make_unique<TorqueModel>(model.with(terms));
     if (columns.any_needs_torque() || !model.robot().torque_effects.empty())
-      fitted_ = std::make_unique<TorqueModel>(fitted_->seeing(seen));
+      fitted_ = std::make_unique<TorqueModel>(fitted_->seeing(model));
   }
 
   MatrixXd operator()(Tile* tile) const {
@@ -415,37 +470,8 @@ class ErrorsOf {
 
 std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const VectorXd& values,
                             const Folds& folds) {
-  const ErrorsOf errors_of(columns, model, model, values);
+  const ErrorsOf errors_of(columns, model, values);
   return noise_of(columns.tiles(), [&](Tile& tile) { return errors_of(&tile); }, folds);
-}
-
-std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                           const VectorXd& values, const Folds& folds) {
-  const auto joints = static_cast<Index>(columns.tiles().robot().driven_count());
-  VectorXd squares = VectorXd::Zero(joints), rows = squares;
-  std::vector<std::pair<VectorXd, VectorXd>> lot(Tiles::kTogether);
-  const ErrorsOf errors_of(columns, subtracted, seen, values);
-  const auto work = [&](Tile& tile, std::size_t k) {
-    const MatrixXd errors = errors_of(&tile);
-    const VectorXd time = tile.own_time();
-    lot[k] = {VectorXd::Zero(joints), VectorXd::Zero(joints)};
-    for (Index i = 0; i < tile.count; ++i) {
-      if (folds.fold(tile.recording, time[i]) < 0) continue;
-      for (Index j = 0; j < joints; ++j) {
-        if (std::isnan(errors(i, j)) || tile.inside(i, j) == 0.0) continue;
-        lot[k].first[j] += errors(i, j) * errors(i, j);
-        lot[k].second[j] += 1.0;
-      }
-    }
-  };
-  const auto add = [&](std::size_t k) {
-    squares += lot[k].first;
-    rows += lot[k].second;
-  };
-  columns.tiles().for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; }, work, add);
-  std::vector<double> out;
-  for (Index j = 0; j < joints; ++j) out.push_back(rows[j] < 2.0 ? 0.0 : std::sqrt(squares[j] / rows[j]));
-  return out;
 }
 
 }  // namespace truing::dynamics

@@ -60,27 +60,32 @@ class DesignColumns {
   mutable std::vector<char> stale_;   ///< by tile: turned() since
 };
 
-/// What a fit of all columns leaves of the torque that `subtracted` leaves, in rows that these folds have, those at
-/// rest included, so none is left out: rms by joint [Nm | N]. Columns that need a torque were last summed with that of
-/// `seen`.
-std::vector<double> rms_of(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                           const Eigen::VectorXd& values, const Folds& folds);
-
 /// Sums of the same columns over the same folds, from before the torque that is seen became another, or friction
 /// turned otherwise (DesignColumns::turned): products of columns that ask for neither are as they were.
 struct EarlierSums {
-  TorqueGrams grams = nullptr;
+  std::vector<TorqueGrams> grams{};  ///< of the same rows; none: there are no such sums
   bool turned = false;
   /// By column of the design; empty: none. Nobody will choose them, so the torque that they saw will do.
   std::vector<bool> idle{};
 };
 
-/// Rows of a joint: those that are fitted, in which it moves, or all that are judged.
-enum class Rows { fitted, judged };
+/// Rows of a joint: those that are fitted, in which it moves; those beside them in which it rests, but for ends at
+/// which it turns (Tile::inside); all that are judged.
+enum class Rows { fitted, resting, judged };
 
-/// Measured torque less that of `subtracted` against the design's columns. Terms that need a torque see that of `seen`.
-TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
-                      const Folds& folds, const EarlierSums& earlier = {}, Rows rows = Rows::fitted);
+/// Measured torque less that of `subtracted` against the design's columns, by kinds of rows, in one pass. Terms that
+/// need a torque see that of `seen`.
+std::vector<TorqueGrams> sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
+                                   const Folds& folds, const EarlierSums& earlier, const std::vector<Rows>& rows);
+/// The same of one kind.
+inline TorqueGrams sum_grams(const DesignColumns& columns, const TorqueModel& subtracted, const TorqueModel& seen,
+                             const Folds& folds, const EarlierSums& earlier = {}, Rows rows = Rows::fitted) {
+  return sum_grams(columns, subtracted, seen, folds, earlier, std::vector<Rows>{rows}).front();
+}
+
+/// What values, by column of the design, leave of the torques that were summed: rms of all of these rows by joint
+/// [Nm | N].
+std::vector<double> rms_of(const std::vector<TorqueGrams>& rows, const Eigen::VectorXd& values);
 
 /// What the model and the columns times values leave; no column that has a value may need a torque.
 std::vector<Noise> noise_of(const DesignColumns& columns, const TorqueModel& model, const Eigen::VectorXd& values,

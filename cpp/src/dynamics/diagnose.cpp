@@ -321,7 +321,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
         model = model.turning(problem.range.turns);
       }
     }
-    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train, {grams, turned, idle});
+    if (round > 0) grams = sum_grams(*columns, problem.nominal, model, problem.train, {{grams}, turned, idle});
     const Sums sums = sums_of(grams, noise, *design, priors, options.threads);
     const Search search(*design, sums, nuisance, options.threads);
     choice = search.run(round == 0 ? Choice{} : choice, limits, false);

@@ -142,7 +142,7 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
   TorqueModel model = groundwork.model;
   std::vector<Noise> noise = groundwork.noise;
   std::vector<int> groups;
-  TorqueGrams grams;
+  std::vector<TorqueGrams> grams;
   Sums sums;
   Fit fit;
   // Terms that need the torque see that of the model found in the round before. Beside the links' masses a drive's
@@ -159,8 +159,8 @@ TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings,
         model = model.turning(problem.range.turns);
       }
     }
-    grams = sum_grams(columns, problem.nominal, model, problem.train, {grams, turned});
-    sums = sums_of(grams, noise, design, with_prior);
+    grams = sum_grams(columns, problem.nominal, model, problem.train, {grams, turned}, std::vector<Rows>{Rows::fitted});
+    sums = sums_of(grams.front(), noise, design, with_prior);
     groups = best_forms(design, sums);
     fit = fit_of(sums, columns_of(design, groups));
     model = problem.nominal.with(valued(design, fit));

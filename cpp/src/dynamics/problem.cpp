@@ -645,12 +645,13 @@ bool choose_turns_again(Problem* problem, const TorqueDesign& design, const Torq
   DesignColumns table(problem->tiles, design);
   std::vector<int> columns(design.terms.size());
   std::iota(columns.begin(), columns.end(), 0);
-  TorqueGrams grams;  // with the turns before
+  std::vector<TorqueGrams> grams;  // with the turns before
   choose_turns(problem, may_fade, [&] {
     table.turned();
-    grams = sum_grams(table, problem->nominal, seen.turning(problem->range.turns), problem->train, {grams, true});
-    const Fit fit = fit_of(sums_of(grams, noise, design, inertial_columns(design)), columns);
-    return rms_of(table, problem->nominal, seen, by_column(design, fit), problem->train);
+    grams = sum_grams(table, problem->nominal, seen.turning(problem->range.turns), problem->train, {grams, true},
+                      {Rows::fitted, Rows::resting});
+    const Fit fit = fit_of(sums_of(grams.front(), noise, design, inertial_columns(design)), columns);
+    return rms_of(grams, by_column(design, fit));
   });
   return !same(problem->range.turns, before);
 }
@@ -662,16 +663,17 @@ Groundwork groundwork_of(Problem* problem, bool may_fade) {
   }
   TorqueDesign design = standard_design(*problem);
   DesignColumns table(problem->tiles, design);
-  TorqueGrams grams;
+  std::vector<TorqueGrams> grams;
   const auto fitted = [&] {
     design = standard_design(*problem);  // of the same columns
     table.turned();
-    grams = sum_grams(table, problem->nominal, problem->nominal, problem->train, {grams, true});
-    return standard_fit(*problem, design, table, grams);
+    grams = sum_grams(table, problem->nominal, problem->nominal, problem->train, {grams, true},
+                      {Rows::fitted, Rows::resting});
+    return standard_fit(*problem, design, table, grams.front());
   };
   choose_turns(problem, may_fade, [&] {
-    const StandardFit now = fitted();
-    return rms_of(table, problem->nominal, problem->nominal, by_column(design, now.fit), problem->train);
+    const VectorXd values = by_column(design, fitted().fit);
+    return rms_of(grams, values);
   });
   StandardFit chosen = fitted();
   std::vector<Noise> noise = noise_of(table, problem->nominal, by_column(design, chosen.fit), problem->train);

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 the truing authors
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
 #include <numeric>
 #include <vector>
 
@@ -108,13 +109,13 @@ TEST_CASE("sums with what is known from before are those made anew, to the bit")
   DesignColumns columns(problem.tiles, design);
   const TorqueGrams before = sum_grams(columns, problem.nominal, problem.nominal, problem.train);
   const TorqueModel more = with_more(problem.nominal, design);
-  const TorqueGrams seen = sum_grams(columns, problem.nominal, more, problem.train, {before});
+  const TorqueGrams seen = sum_grams(columns, problem.nominal, more, problem.train, {{before}});
   check_same(seen, sum_grams(DesignColumns(problem.tiles, design), problem.nominal, more, problem.train));
   CHECK((*seen)[0].folds[0].xx != (*before)[0].folds[0].xx);
 
   const TorqueModel turning = more.turning({problem.robot.driven_count(), FrictionTurn{0.01, 1e-4}});
   columns.turned();
-  const TorqueGrams turned = sum_grams(columns, problem.nominal, turning, problem.train, {seen, true});
+  const TorqueGrams turned = sum_grams(columns, problem.nominal, turning, problem.train, {{seen}, true});
   check_same(turned, sum_grams(DesignColumns(problem.tiles, design), problem.nominal, turning, problem.train));
   CHECK((*turned)[0].folds[0].xx != (*seen)[0].folds[0].xx);
 }
@@ -139,11 +140,45 @@ TEST_CASE("columns that are idle keep the torque that they saw until they are no
   const auto product = [](const TorqueGrams& grams, const std::vector<Eigen::Index>& at) -> Eigen::MatrixXd {
     return (*grams)[0].folds[0].xx(at, at);
   };
-  const TorqueGrams some = sum_grams(columns, problem.nominal, more, problem.train, {before, false, idle});
+  const TorqueGrams some = sum_grams(columns, problem.nominal, more, problem.train, {{before}, false, idle});
   const TorqueGrams anew = sum_grams(DesignColumns(problem.tiles, design), problem.nominal, more, problem.train);
   CHECK(product(some, resting) == product(before, resting));
   CHECK(product(some, working) == product(anew, working));
-  check_same(sum_grams(columns, problem.nominal, more, problem.train, {some}), anew);
+  check_same(sum_grams(columns, problem.nominal, more, problem.train, {{some}}), anew);
+}
+
+TEST_CASE("what values leave of all rows but turns at the ends is known from sums of moving and of resting rows") {
+  const std::vector<Recording> recordings = recorded();
+  Problem problem(level_arm(), recordings, {});
+  const TorqueDesign all = whole(problem);
+  std::vector<int> standard;
+  for (std::size_t g = 0; g < all.groups.size(); ++g)
+    if (all.groups[g].standard) standard.push_back(static_cast<int>(g));
+  const TorqueDesign design = part_of(all, standard);
+  const std::vector<TorqueGrams> grams =
+      sum_grams(DesignColumns(problem.tiles, design), problem.nominal, problem.nominal, problem.train, {},
+                {dynamics::Rows::fitted, dynamics::Rows::resting});
+  Fit fit;
+  for (std::size_t c = 0; c < design.terms.size(); ++c) fit.columns.push_back(static_cast<int>(c));
+  fit.values = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(design.terms.size()), 0.02, 0.1);
+  const TorqueModel model = problem.nominal.with(valued(design, fit));
+
+  const auto joints = static_cast<Eigen::Index>(problem.robot.driven_count());
+  std::vector<Eigen::MatrixXd> errors(Tiles::kTogether);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(joints), rows = squares;
+  problem.tiles.for_each([&](std::size_t r) { return problem.train.of_recording[r] >= 0; },
+                         [&](Tile& tile, std::size_t k) {
+                           errors[k] = tile.inside.cwiseProduct(tile.measured - own_torque(model, &tile));
+                           errors[k].conservativeResize(Eigen::NoChange, 2 * joints);
+                           errors[k].rightCols(joints) = tile.inside;
+                         },
+                         [&](std::size_t k) {
+                           squares += errors[k].leftCols(joints).colwise().squaredNorm().transpose();
+                           rows += errors[k].rightCols(joints).colwise().sum().transpose();
+                         });
+  const std::vector<double> rms = rms_of(grams, by_column(design, fit));
+  for (Eigen::Index j = 0; j < joints; ++j)
+    CHECK(rms[static_cast<std::size_t>(j)] == doctest::Approx(std::sqrt(squares[j] / rows[j])).epsilon(1e-9));
 }
 
 TEST_CASE("sums of some columns are those that all columns have, to the bit") {
