@@ -758,7 +758,7 @@ static bool add_name(const Work& work, const std::set<int>& asked, Decision* out
   return true;
 }
 
-/// Questions about what is chosen: not to be asked again of what they take away.
+/// All questions, of what is chosen, which joins those that were `asked` about.
 static void question_all(Work* work, const Robot& robot, std::set<int>* asked, Decision* out) {
   asked->insert(out->state.choice.groups.begin(), out->state.choice.groups.end());
   question_bundles(work, robot, out);

@@ -259,28 +259,32 @@ void add_places(std::vector<Eigen::MatrixXd>* tables, std::vector<Eigen::MatrixX
 
 }  // namespace
 
+template <typename Run>
+void RigidChain::fill(const std::vector<Eigen::MatrixXd*>& tables, const Eigen::MatrixXd& q, const Eigen::MatrixXd* qd,
+                      const Eigen::MatrixXd* qdd, Run run) const {
+  const auto pass = [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first,
+                        Eigen::Index rows) {
+    fill_tables(tables, first, rows, tile, [&](const kernel::RigidTile& there) { run(program, there, first, rows); });
+  };
+  passes(q, qd, qdd, 0, q.rows(), pass);
+}
+
 Eigen::MatrixXd RigidChain::torques(const Eigen::MatrixXd& q, const Eigen::MatrixXd& qd, const Eigen::MatrixXd& qdd,
                                     const Eigen::VectorXd& parameters) const {
   Eigen::MatrixXd out(q.rows(), driven());
-  passes(
-      q, &qd, &qdd, 0, q.rows(),
-      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
-        fill_tables({&out}, first, rows, tile, [&](const kernel::RigidTile& there) {
-          kernel::rigid_functions().torque(program, there, parameters.data());
-        });
-      });
+  fill({&out}, q, &qd, &qdd,
+       [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index, Eigen::Index) {
+         kernel::rigid_functions().torque(program, tile, parameters.data());
+       });
   return out;
 }
 
 Eigen::MatrixXd RigidChain::weights(const Eigen::MatrixXd& q, const Eigen::VectorXd& parameters) const {
   Eigen::MatrixXd out(q.rows(), driven());
-  passes(
-      q, nullptr, nullptr, 0, q.rows(),
-      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
-        fill_tables({&out}, first, rows, tile, [&](const kernel::RigidTile& there) {
-          kernel::rigid_functions().weight(program, there, parameters.data());
-        });
-      });
+  fill({&out}, q, nullptr, nullptr,
+       [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index, Eigen::Index) {
+         kernel::rigid_functions().weight(program, tile, parameters.data());
+       });
   return out;
 }
 
@@ -290,13 +294,10 @@ std::vector<Eigen::MatrixXd> RigidChain::mass_matrices(const Eigen::MatrixXd& q,
   std::vector<Eigen::MatrixXd> out = empty_tables(q.rows(), driven());
   std::vector<Eigen::MatrixXd*> places;
   add_places(&out, &places);
-  passes(
-      q, &rest, &rest, 0, q.rows(),
-      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
-        fill_tables(places, first, rows, tile, [&](const kernel::RigidTile& there) {
-          kernel::rigid_functions().mass_matrix(program, there, parameters.data());
-        });
-      });
+  fill(places, q, &rest, &rest,
+       [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index, Eigen::Index) {
+         kernel::rigid_functions().mass_matrix(program, tile, parameters.data());
+       });
   return out;
 }
 
@@ -314,21 +315,18 @@ RigidChain::Changes RigidChain::torque_changes(const Eigen::MatrixXd& q, const E
   }
   places.resize(2 * static_cast<std::size_t>(driven()), nullptr);
   thread_local std::vector<double> change;
-  passes(
-      q, &qd, &qdd, 0, q.rows(),
-      [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
-        change.resize(static_cast<std::size_t>(3 * driven() * tile.stride));
-        double* to = change.data();
-        for (const Eigen::MatrixXd* const table : {&dq, &dqd, &dqdd}) {
-          for (Eigen::Index k = 0; k < driven(); ++k, to += tile.stride) {
-            std::copy_n(table->col(k).data() + first, rows, to);
-            std::fill(to + rows, to + tile.samples, 0.0);
-          }
-        }
-        fill_tables(places, first, rows, tile, [&](const kernel::RigidTile& there) {
-          kernel::rigid_functions().torque_change(program, there, parameters.data(), change.data());
-        });
-      });
+  fill(places, q, &qd, &qdd,
+       [&](const kernel::RigidProgram& program, const kernel::RigidTile& tile, Eigen::Index first, Eigen::Index rows) {
+         change.resize(static_cast<std::size_t>(3 * driven() * tile.stride));
+         double* to = change.data();
+         for (const Eigen::MatrixXd* const table : {&dq, &dqd, &dqdd}) {
+           for (Eigen::Index k = 0; k < driven(); ++k, to += tile.stride) {
+             std::copy_n(table->col(k).data() + first, rows, to);
+             std::fill(to + rows, to + tile.samples, 0.0);
+           }
+         }
+         kernel::rigid_functions().torque_change(program, tile, parameters.data(), change.data());
+       });
   return out;
 }
 

@@ -70,6 +70,10 @@ class RigidChain {
   template <typename Run>
   void passes(const Eigen::MatrixXd& q, const Eigen::MatrixXd* qd, const Eigen::MatrixXd* qdd, Eigen::Index begin,
               Eigen::Index end, Run run) const;
+  /// The same of all rows, where the tile's blocks are `tables` of shape (rows, driven); null: there is none.
+  template <typename Run>
+  void fill(const std::vector<Eigen::MatrixXd*>& tables, const Eigen::MatrixXd& q, const Eigen::MatrixXd* qd,
+            const Eigen::MatrixXd* qdd, Run run) const;
 
   struct Link {
     Eigen::Isometry3d before, after;  ///< the fixed parts: T = before * motion * after

@@ -142,6 +142,7 @@ double FoldFit::squares(const Evidence::State& state) {
 }
 
 Search::Look& Search::look(const Choice& choice) const {
+  const std::lock_guard<std::mutex> one(asking_);
   const auto known = looks_.find({choice.groups, choice.scales});
   if (known != looks_.end()) return known->second;
   Look& out = looks_[{choice.groups, choice.scales}];
@@ -195,6 +196,7 @@ std::vector<bool> Search::idle_flights(const Choice& choice) const {
 
 const VectorXd& Search::squares_of_folds(const Choice& choice) const {
   Look& seen = look(choice);
+  const std::lock_guard<std::mutex> one(asking_);
   if (seen.squares.size() == 0) fill_squares({&seen}, 1);
   return seen.squares;
 }

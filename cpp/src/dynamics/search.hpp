@@ -78,10 +78,11 @@ class Search {
   Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
 
   enum class Ahead { state, squares };
-  /// Looks at choices side by side: their states, and their squares on folds, are known when somebody asks for them.
-  /// Threads may then ask for them side by side, and, once the largest was shared, for gains of it and of its parts. On
+  /// Looks at choices side by side: their states, and their squares on folds, are known when somebody asks for them. On
   /// one thread nothing is looked at before it is asked for; no number depends on it.
   void look_ahead(const std::vector<Choice>& choices, Ahead what) const;
+  /// Before several threads ask for gains of this choice, and of parts of it. For states and squares they may ask as it
+  /// is: for what nobody looked at before, one after the other.
   void share(const Choice& largest) const { evidence_.keep_rest(largest); }
 
   const Evidence& evidence() const { return evidence_; }
@@ -137,6 +138,7 @@ class Search {
   int threads_;
   std::vector<std::unique_ptr<FoldFit>> folds_;
   mutable std::map<std::pair<std::vector<int>, std::vector<double>>, Look> looks_;  ///< by groups and scales
+  mutable std::mutex asking_;                                                       ///< of a new look
   std::size_t joints_ = 1;
 };
 

@@ -18,41 +18,53 @@ inline void store_lanes(double* p, Vec v) {
   store(p + 2 * kLanes, v.z);
 }
 
-/// Where a frame is and how it moves, in the axes of the base.
-struct Moving {
+/// Where a frame is, in the axes of the base.
+struct Standing {
   Vec x, y, z, o;  ///< columns of R, origin
-  Vec w, alpha;    ///< angular velocity and acceleration
-  Vec a;           ///< acceleration of the origin, less gravity
 
   Vec turned(Vec v) const { return v.x * x + v.y * y + v.z * z; }             ///< R v
   Vec turned_back(Vec v) const { return {dot(x, v), dot(y, v), dot(z, v)}; }  ///< R^T v
-  Vec pull(Vec r) const { return cross(alpha, r) + cross(w, cross(w, r)); }   ///< of a point r further on, more
 
   /// On to a frame that is fixed to this one.
   void pass(const double* frame) {
-    const Vec r = turned(splat_vec(frame + 9));
-    a = a + pull(r);
-    o = o + r;
+    o = o + turned(splat_vec(frame + 9));
     const Vec new_x = turned(splat_vec(frame)), new_y = turned(splat_vec(frame + 3));
     z = turned(splat_vec(frame + 6));
     x = new_x;
     y = new_y;
   }
 
-  /// Luh, Walker and Paul 1980, eq. 1 to 3, seen from the base; what slides takes its origin along.
-  void turn(Pack angle, Pack rate, Pack acceleration) {
-    alpha = alpha + acceleration * z + rate * cross(w, z);
-    w = w + rate * z;
+  void turn(Pack angle) {
     Pack s, c;
     sine_cosine(angle, &s, &c);
     const Vec old_x = x;
     x = c * x + s * y;
     y = c * y - s * old_x;
   }
+  void slide(Pack length) { o = o + length * z; }
+};
+
+/// And how it moves.
+struct Moving : Standing {
+  Vec w, alpha;  ///< angular velocity and acceleration
+  Vec a;         ///< acceleration of the origin, less gravity
+
+  Vec pull(Vec r) const { return cross(alpha, r) + cross(w, cross(w, r)); }  ///< of a point r further on, more
+
+  void pass(const double* frame) {
+    a = a + pull(turned(splat_vec(frame + 9)));
+    Standing::pass(frame);
+  }
+
+  /// Luh, Walker and Paul 1980, eq. 1 to 3, seen from the base; what slides takes its origin along.
+  void turn(Pack angle, Pack rate, Pack acceleration) {
+    alpha = alpha + acceleration * z + rate * cross(w, z);
+    w = w + rate * z;
+    Standing::turn(angle);
+  }
   void slide(Pack length, Pack rate, Pack acceleration) {
-    const Vec r = length * z;
-    a = a + pull(r) + acceleration * z + (rate + rate) * cross(w, z);
-    o = o + r;
+    a = a + pull(length * z) + acceleration * z + (rate + rate) * cross(w, z);
+    Standing::slide(length);
   }
 };
 
@@ -143,7 +155,7 @@ inline void sweep(const RigidProgram& program, const RigidTile& tile, Joint join
   const Pack zero{}, one = splat(1.0);
   const Vec nothing{zero, zero, zero};
   for (int first = 0; first < tile.samples; first += kLanes) {
-    Moving at{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}, nothing, nothing, nothing, nothing};
+    Moving at{{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}, nothing}, nothing, nothing, nothing};
     at.a = nothing - splat_vec(program.gravity);
     for (int i = 0; i < program.link_count; ++i) {
       const RigidLink& link = program.links[i];
@@ -177,28 +189,8 @@ void torque(const RigidProgram& program, const RigidTile& tile, const double* pa
   });
 }
 
-/// Where a frame is, in the axes of the base.
-struct Standing {
-  Vec x, y, z, o;  ///< columns of R, origin
-
-  Vec turned(Vec v) const { return v.x * x + v.y * y + v.z * z; }
-  void pass(const double* frame) {
-    o = o + turned(splat_vec(frame + 9));
-    const Vec new_x = turned(splat_vec(frame)), new_y = turned(splat_vec(frame + 3));
-    z = turned(splat_vec(frame + 6));
-    x = new_x;
-    y = new_y;
-  }
-  void turn(Pack angle) {
-    Pack s, c;
-    sine_cosine(angle, &s, &c);
-    const Vec old_x = x;
-    x = c * x + s * y;
-    y = c * y - s * old_x;
-  }
-};
-
-/// What gravity asks of the joints, of the mass and first moment of all that is behind each.
+/// What gravity asks of the joints, by virtual work: with m the mass and s the first moment about the base's origin of
+/// all that is behind joint i, -g . (z x (s - m o)) where it turns about z through o, -g . (m z) where it slides.
 void weight(const RigidProgram& program, const RigidTile& tile, const double* parameters) {
   const Pack zero{}, one = splat(1.0);
   const int links = program.link_count, driven = program.driven_count;
@@ -216,7 +208,7 @@ void weight(const RigidProgram& program, const RigidTile& tile, const double* pa
       if (link.revolute)
         at.turn(motion);
       else
-        at.o = at.o + motion * at.z;
+        at.slide(motion);
       if (link.moves_after) at.pass(link.after);
       store_lanes(place(i) + 6 * kLanes, at.turned(splat_vec(p + 1)) + splat(p[0]) * at.o);
     }

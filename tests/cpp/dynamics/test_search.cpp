@@ -11,6 +11,7 @@
 #include <Eigen/Dense>
 
 #include "dynamics/search.hpp"
+#include "math/batch.hpp"
 
 using namespace truing;
 using namespace truing::dynamics;
@@ -160,13 +161,21 @@ TEST_CASE("choices that were looked at side by side are as those that were looke
   const TwoForms some(0.5);
   const std::vector<Choice> choices = {{}, {{0}, {1.0}}, {{1}, {1.0}}, {{0, 1}, {1.0, 0.1}}, {{0}, {1.0}}};
   const dynamics::Search alone(some.design, some.sums, {}, 1);
-  for (const int threads : {1, 2}) {
-    const dynamics::Search together(some.design, some.sums, {}, threads);
-    together.look_ahead(choices, dynamics::Search::Ahead::squares);
+  const auto check_as_alone = [&](const dynamics::Search& together) {
     for (const Choice& choice : choices) {
       CAPTURE(choice.groups.size());
       CHECK(together.squares_of_folds(choice) == alone.squares_of_folds(choice));
       CHECK(together.state(choice).score == alone.state(choice).score);
     }
+  };
+  for (const int threads : {1, 2}) {
+    const dynamics::Search together(some.design, some.sums, {}, threads);
+    together.look_ahead(choices, dynamics::Search::Ahead::squares);
+    check_as_alone(together);
   }
+  // Threads that ask for what nobody has looked at.
+  const dynamics::Search unseen(some.design, some.sums, {}, 2);
+  truing::math::for_each_on_threads(
+      choices.size(), 2, {}, [&](std::size_t k) { unseen.squares_of_folds(choices[k]); }, 1);
+  check_as_alone(unseen);
 }
