@@ -174,6 +174,35 @@ def test_the_constant_of_a_single_drive_is_fitted_anew(
     assert runnable(exported).robot is exported.robot
 
 
+def test_friction_that_fades_at_rest_is_fitted_anew_as_one_that_holds(
+    simulated: SimulatedMotion, trained: list[Recording], tmp_path: Path
+) -> None:
+    """At its joint alone: 7 Nm, which a fit that lets it fade would have put elsewhere."""
+    fades = {"coulomb.J2": 3.0, "coulomb.J2.turn_travel": 1e-4, "coulomb.J2.turn_fade": 1.0}
+    effects = [
+        effect.replace(parameters={**effect.parameters, **fades})
+        if "coulomb.J2" in effect.parameters
+        else effect
+        for effect in simulated.truth.torque_effects
+    ]
+    robot = simulated.truth.replace(torque_effects=effects)
+    late = AppliedEffect("time_offset", [], {"time_offset": 0.0})  # of no joint
+    kept = refit.with_friction_that_holds(robot.replace(torque_effects=[*effects, late]), trained, None)
+    assert "time_offset" in [effect.effect for effect in kept.torque_effects]
+    exported = export(robot, "mjcf", tmp_path, recordings=trained)
+    assert exported.refitted == ("coulomb.J2.turn_fade", "load_friction.J2", "load_friction.J3")
+    (said,) = [item for item in exported.not_written if item.name == "coulomb.J2.turn_fade"]
+    assert "fitted anew without it" in said.reason
+    assert exported.callbacks is not None and exported.callbacks_model is not None
+    holds = mujoco.MjModel.from_xml_path(str(exported.callbacks_model))
+    load(exported.callbacks).prepare(holds)
+    assert holds.joint("J2").frictionloss[0] == pytest.approx(7.0, rel=0.05)
+    as_it_is = mujoco.MjModel.from_xml_path(str(export(robot, "mjcf", tmp_path / "as it is").model))
+    for joint in ("J1", "J4"):
+        assert holds.joint(joint).frictionloss[0] == as_it_is.joint(joint).frictionloss[0]
+    assert "needs the recordings" in export(robot, "urdf", tmp_path / "urdf").not_refitted
+
+
 def test_constants_of_several_drives_stay(simulated: SimulatedMotion, trained: list[Recording]) -> None:
     """They share a scale with all masses."""
     robot = with_constants(simulated.truth, J2=0.01, J3=0.02)

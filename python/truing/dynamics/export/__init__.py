@@ -95,7 +95,8 @@ def export(
     (not for mjcf). not_written.yaml lists what the model lacks, each with its size in Nm. recordings: what
     the robot was fitted to, and nothing that was held out. Where the format does not hold some effects,
     Coulomb friction, damping and bodies are fitted anew to them without these; callbacks.py then belongs to
-    callbacks.xml, which has the robot as it is. Sizes are stated on them. Without any, friction and damping
+    callbacks.xml, which has the robot as it is, but for friction that fades at rest: at its joints friction
+    that holds is fitted anew. Sizes are stated on them. Without any, friction and damping
     stand for what is lacking, on a motion through the robot's range with the torques of gravity. cutoff:
     [Hz] that the robot was fitted with.
 
@@ -111,14 +112,18 @@ def export(
         )
     text = None if source is None else _source_text(Path(source))
     upright = with_gravity_turned(robot)
-    whole = _written(upright, to, text, recordings)
-    alone, parameters, why_not = _refitted(whole, to, text, recordings, cutoff)
+    whole, faded, not_held = _holding(_written(upright, to, text, recordings), to, text, recordings, cutoff)
+    alone, parameters, why_not = _refitted(whole, upright, to, text, recordings, cutoff)
+    parameters = [*(item.name for item in faded), *parameters]
+    why_not = "; ".join(words for words in (not_held, why_not) if words)
     files = dict(alone.files)
     if whole.callbacks:
         files[CALLBACKS] = whole.callbacks
     if whole.callbacks and alone is not whole:
         files[CALLBACKS_MODEL] = whole.files[whole.main]
-    left = sorted(alone.left, key=lambda item: -item.size if math.isfinite(item.size) else -math.inf)
+    left = sorted(
+        [*alone.left, *faded], key=lambda item: -item.size if math.isfinite(item.size) else -math.inf
+    )
     if to != "mjcf" and upright is not robot:
         way = ", ".join(f"{value:.4g}" for value in upright.gravity)
         reason = f"gravity is the scene's: ({way}) m/s^2 in the base frame"
@@ -187,11 +192,39 @@ def _written(
     return _Written(robot, chain, "actuators.py", files, "", left)
 
 
-def _refitted(
+def _holding(
     whole: _Written, to: Simulator, source: str | None, recordings: Sequence[Recorded], cutoff: float | None
+) -> tuple[_Written, list[NotWritten], str]:
+    """The robot with friction that holds where it fades at rest, fitted anew; what is lost by that, which no
+    simulator has; or why it was not done."""
+    parameters = refit.fading(whole.robot)
+    if not parameters:
+        return whole, [], ""
+    wanted = f"not fitted anew without {', '.join(parameters)}"
+    if not recordings:
+        return whole, [], f"{wanted}: that needs the recordings that the robot was fitted to"
+    try:
+        robot = refit.with_friction_that_holds(whole.robot, recordings, cutoff)
+    except InputError as error:
+        return whole, [], f"{wanted}: {error}"
+    lost = [
+        replace(item, reason=f"{item.reason}; fitted anew without it")
+        for item in whole.left
+        if item.name in parameters
+    ]
+    return _written(robot, to, source, recordings), lost, ""
+
+
+def _refitted(
+    whole: _Written,
+    robot: _core.Robot,
+    to: Simulator,
+    source: str | None,
+    recordings: Sequence[Recorded],
+    cutoff: float | None,
 ) -> tuple[_Written, list[str], str]:
-    """What is written where no callback adds anything: the robot itself, or the one that was fitted without
-    what the format does not hold. Then the parameters that this is; or why it was not done."""
+    """What is written where no callback adds anything: `whole`, or the robot fitted without what the format
+    does not hold. Then the parameters that this is; or why it was not done."""
     bare = bool(whole.callbacks) and bool(recordings)
     near = _written(whole.robot, to, source, recordings, alone=True) if bare else whole
     parameters = near.lacking()
@@ -201,7 +234,7 @@ def _refitted(
     if not recordings:
         return whole, [], f"{wanted}: that needs the recordings that the robot was fitted to"
     try:
-        anew = _anew(whole, parameters, to, source, recordings, cutoff)
+        anew = _anew(robot, parameters, to, source, recordings, cutoff, alone=bool(whole.callbacks))
     except InputError as error:
         return whole, [], f"{wanted}: {error}"
     without = set(parameters)
@@ -219,20 +252,21 @@ def _refitted(
 
 
 def _anew(
-    whole: _Written,
+    robot: _core.Robot,
     parameters: Sequence[str],
     to: Simulator,
     source: str | None,
     recordings: Sequence[Recorded],
     cutoff: float | None,
+    alone: bool,
 ) -> _Written:
     """Fitted anew without these parameters, with laws of friction that stand in their place at joints where
     the format can hold those."""
     bare: set[str] = set()
     while True:
-        robot = refit.fit_without(whole.robot, parameters, to, recordings, cutoff, bare)
-        anew = _written(robot, to, source, recordings, alone=bool(whole.callbacks))
-        more = refit.joints_with(robot, anew.lacking()) - bare
+        fitted = refit.fit_without(robot, parameters, to, recordings, cutoff, bare)
+        anew = _written(fitted, to, source, recordings, alone=alone)
+        more = refit.joints_with(fitted, anew.lacking()) - bare
         if not more:
             return anew
         bare |= more

@@ -9,7 +9,7 @@ stays in the fit: friction that is fitted without it bends towards it and moves 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from truing.dynamics.api import identify
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.recorded import Recorded
 from truing.errors import InputError
+from truing.model import AppliedEffect
 
 _ANEW = (
     "coulomb",
@@ -33,10 +34,13 @@ _ANEW = (
 )
 """Effects that are fitted anew where the robot carries them; the others stay as they are. What a drive's
 constant is taken for depends on friction that grows with the load."""
+_AT_ITS_JOINT = ("coulomb", "viscous", "viscous_law", "stribeck", "presliding")
+"""Friction that is fitted anew at a joint whose friction fades at rest: these trade places."""
 _OF_MOTION = {"load_friction", "viscous_law", "stribeck", "position_friction"}
 """Laws of friction that one of the speed can stand for in part; what goes with warmth or time it cannot."""
 _TAKEN_UP = _OF_MOTION | {"thermal_friction", "warmup", "presliding", "armature"}
 """Effects that Coulomb friction, damping and bodies can make up for."""
+_FORMS = ("viscous_law.quadratic", "viscous_law.cubic", "viscous_law.root", "viscous_law.saturating")
 _NO_FORMS = ("viscous_law.root", "viscous_law.saturating")  # no format holds these
 _NONE_HELD_OUT = 1e-6  # test_share at which no recording and no block of time is held out
 _SHORTEST = 1.0  # [s] of a stretch that is fitted to
@@ -53,6 +57,16 @@ def lacking(robot: _core.Robot, left: Iterable[NotWritten]) -> list[str]:
         for effect in robot.torque_effects
         for parameter in effect.parameters
         if any(parameter == name or parameter.startswith(f"{name}.") for name in names)
+    ]
+
+
+def fading(robot: _core.Robot) -> list[str]:
+    """Parameters by which dry friction fades at rest: no simulator has that."""
+    return [
+        parameter
+        for effect in robot.torque_effects
+        for parameter in effect.parameters
+        if parameter.endswith(".turn_fade")
     ]
 
 
@@ -110,9 +124,7 @@ def fit_without(
 
     Raises InputError on recordings that nothing can be fitted to.
     """
-    given = [recording for recording in recordings if isinstance(recording, _core.Recording)]
-    if len(given) < len(recordings):
-        raise InputError("recordings: expected those of truing.dynamics.load_recordings")
+    given = _read_into_memory(recordings)
     rest = [
         effect.replace(parameters={k: v for k, v in effect.parameters.items() if k not in parameters})
         for effect in robot.torque_effects
@@ -132,25 +144,70 @@ def fit_without(
         where["viscous_law"] |= lost
         # MuJoCo has it as a part of what builds up over an angle after a reversal.
         where["stribeck"] |= lost & where["presliding"]
+    kept = [effect for effect in rest if effect.effect not in where]
+    return _fitted(robot, kept, where, given, cutoff, _NO_FORMS)
+
+
+def with_friction_that_holds(
+    robot: _core.Robot, recordings: Sequence[Recorded], cutoff: float | None
+) -> _core.Robot:
+    """The robot with all friction of joints where it fades at rest fitted anew, with friction that does not,
+    its laws in the forms that they have; of the rest only bodies move with it. recordings, cutoff: as of
+    fit_without, whose errors are raised.
+    """
+    joints = joints_with(robot, fading(robot))
+    where = {
+        name: {j for e in robot.torque_effects if e.effect == name for j in e.joints} & joints
+        for name in _AT_ITS_JOINT
+    }
+    kept = [
+        _elsewhere(effect, where[effect.effect]) if effect.effect in where else effect
+        for effect in robot.torque_effects
+    ]
+    forms = {f"{e.effect}.{key.split('.')[-1]}" for e in robot.torque_effects for key in e.parameters}
+    other_forms = [form for form in _FORMS if form not in forms]
+    kept = [effect for effect in kept if effect.parameters]
+    return _fitted(robot, kept, where, _read_into_memory(recordings), cutoff, other_forms)
+
+
+def _elsewhere(effect: AppliedEffect, joints: Collection[str]) -> AppliedEffect:
+    """What an effect is at other joints than these."""
+    return effect.replace(
+        joints=[joint for joint in effect.joints if joint not in joints],
+        parameters={k: v for k, v in effect.parameters.items() if k.split(".")[1] not in joints},
+    )
+
+
+def _read_into_memory(recordings: Sequence[Recorded]) -> list[_core.Recording]:
+    given = [recording for recording in recordings if isinstance(recording, _core.Recording)]
+    if len(given) < len(recordings):
+        raise InputError("recordings: expected those of truing.dynamics.load_recordings")
+    return given
+
+
+def _fitted(
+    robot: _core.Robot,
+    kept: Sequence[AppliedEffect],
+    where: Mapping[str, set[str]],
+    recordings: Sequence[_core.Recording],
+    cutoff: float | None,
+    leave_out_forms: Sequence[str] = (),
+) -> _core.Robot:
+    """The robot with bodies, and effects at joints by name (`where`), fitted beside those that are kept."""
     options: dict[str, Any] = {} if cutoff is None else {"cutoff": cutoff}
-    # Without its range it counts as one that was not fitted before: how friction turns is chosen anew.
-    bare = robot.replace(torque_effects=[e for e in rest if e.effect not in where], fitted_range={})
-    motion = [recording.replace(test=False) for recording in given]
-
-    def fitted() -> _core.Robot:
-        return identify(
-            bare,
-            motion,
-            effects=[f"{name}:{'+'.join(sorted(joints))}" for name, joints in where.items() if joints],
-            leave_out_forms=_NO_FORMS,
-            test_share=_NONE_HELD_OUT,
-            **options,
-        ).robot
-
-    found = fitted()
-    if driving := _driving(found):
-        where["viscous_law"] -= driving
-        found = fitted()
+    found = identify(
+        # Without its range it counts as one that was not fitted before: how friction turns is chosen anew.
+        robot.replace(torque_effects=list(kept), fitted_range={}),
+        [recording.replace(test=False) for recording in recordings],
+        effects=[f"{name}:{'+'.join(sorted(joints))}" for name, joints in where.items() if joints],
+        leave_out_forms=leave_out_forms,
+        test_share=_NONE_HELD_OUT,
+        **options,
+    ).robot
+    laws = where.get("viscous_law", set())
+    if driving := _driving(found) & laws:
+        without = {**where, "viscous_law": laws - driving}
+        return _fitted(robot, kept, without, recordings, cutoff, leave_out_forms)
     return found
 
 
