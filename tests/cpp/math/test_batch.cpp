@@ -4,6 +4,8 @@
 // A batch on threads: what its progress says, and that it stops when told to.
 
 #include <doctest/doctest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <condition_variable>
@@ -72,3 +74,28 @@ TEST_CASE("what a thread throws comes out") {
                                       }),
                   std::runtime_error);
 }
+
+TEST_CASE("a batch may be asked for out of a batch, and by several threads at once") {
+  std::atomic<int> done{0};
+  const auto inner = [&](std::size_t) { for_each_on_threads(50, 3, {}, [&](std::size_t) { ++done; }, 1); };
+  std::vector<std::thread> callers;
+  for (int k = 0; k < 4; ++k) callers.emplace_back([&] { for_each_on_threads(20, 3, {}, inner, 1); });
+  for (std::thread& caller : callers) caller.join();
+  CHECK(done == 4 * 20 * 50);
+}
+
+#if !defined(__SANITIZE_THREAD__)  // which lets no forked process begin threads
+TEST_CASE("a forked process has helpers of its own") {
+  const auto count = [] {
+    std::atomic<int> done{0};
+    for_each_on_threads(100, 2, {}, [&](std::size_t) { ++done; }, 1);
+    return done.load();
+  };
+  REQUIRE(count() == 100);
+  const pid_t child = fork();
+  if (child == 0) _exit(count() == 100 ? 0 : 1);
+  int status = 1;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(status == 0);
+}
+#endif
