@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <numeric>
 
 #include "dynamics/filter.hpp"
 #include "dynamics/payload.hpp"
@@ -184,6 +185,12 @@ void Tiles::keep() {
         });
       },
       1);
+  // Long recordings first: at the end of a pass nobody waits long for the last one.
+  const auto rows = [](const std::vector<Tile>& part) {
+    return std::accumulate(part.begin(), part.end(), Index{0},
+                           [](Index sum, const Tile& tile) { return sum + tile.motion.rows(); });
+  };
+  std::stable_sort(parts.begin(), parts.end(), [&](const auto& a, const auto& b) { return rows(a) > rows(b); });
   for (std::vector<Tile>& part : parts) std::move(part.begin(), part.end(), std::back_inserter(tiles_));
   for (std::size_t k = 0; k < tiles_.size(); ++k) tiles_[k].number = k;
 }
