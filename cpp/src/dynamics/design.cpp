@@ -57,7 +57,7 @@ struct FreeInput {
   std::string name;
   double low, high;
   bool needs_torque;
-  std::function<VectorXd(const Motion&)> value;
+  std::function<Eigen::Ref<const VectorXd>(const Motion&)> value;
   bool times_direction = false;
   bool narrow = false;  ///< what it drives may be narrow: a detent, a resonance, some seconds
   std::string same{};   ///< the same at all joints that have an input of this name
@@ -66,10 +66,12 @@ struct FreeInput {
 constexpr int kKnots = 8;
 constexpr int kNarrowKnots = 3 * (kKnots - 1) + 1;  ///< the wide ones among them
 
-/// Straight lines between evenly spaced knots: hat number k.
-Eigen::ArrayXd hat(const VectorXd& x, int k, int knots, double low, double high) {
-  const double per_width = (knots - 1) / (high - low);
-  return (1.0 - ((x.array().max(low).min(high) - low) * per_width - k).abs()).max(0.0);
+/// Straight lines between evenly spaced knots: hat number k; beyond the ends it stays as it is there.
+MatrixXd hat(const Eigen::Ref<const VectorXd>& x, int k, int knots, double low, double high) {
+  const auto from_knot = (x.array() - low) * ((knots - 1) / (high - low)) - k;
+  if (k == 0) return (1.0 - from_knot.max(0.0)).max(0.0);
+  if (k == knots - 1) return (1.0 + from_knot.min(0.0)).max(0.0);
+  return (1.0 - from_knot.abs()).max(0.0);
 }
 
 void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int knots, double prior,
@@ -94,9 +96,9 @@ void add_free(const FreeInput& input, std::size_t joint, const Robot& robot, int
     if (!input.same.empty()) term.column = input.same + "." + std::to_string(k) + "." + std::to_string(knots);
     term.prior = prior;
     term.basis = [input, k, knots, joint](const Motion& m) -> MatrixXd {
-      Eigen::ArrayXd out = hat(input.value(m), k, knots, input.low, input.high);
-      if (input.times_direction) out *= m.direction.col(static_cast<Index>(joint)).array();
-      return out.matrix();
+      MatrixXd out = hat(input.value(m), k, knots, input.low, input.high);
+      if (input.times_direction) out.array() *= m.direction.col(static_cast<Index>(joint)).array();
+      return out;
     };
     group.columns.push_back(static_cast<int>(design->terms.size()));
     design->terms.push_back(std::move(term));
@@ -138,27 +140,27 @@ constexpr double kShortest = 5.0;  ///< [s] recordings in which time is an input
 std::vector<FreeInput> inputs_at(std::size_t joint, const Robot& robot, const MotionRange& range) {
   const auto j = static_cast<Index>(joint);
   std::vector<FreeInput> out;
-  const auto load = [j](const Motion& m) -> VectorXd { return m.torque.col(j); };
+  const auto load = [j](const Motion& m) -> Eigen::Ref<const VectorXd> { return m.torque.col(j); };
   const double torque = 2.0 * range.torque[j];
   for (Index k = 0; k < range.lower.size(); ++k) {
     const std::string name = k == j ? "angle" : "angle " + driven_name(robot, static_cast<std::size_t>(k));
     for (const bool times_direction : {false, true})
       out.push_back({name, range.lower[k], range.upper[k], false,
-                     [k](const Motion& m) -> VectorXd { return m.q.col(k); }, times_direction, k == j,
+                     [k](const Motion& m) -> Eigen::Ref<const VectorXd> { return m.q.col(k); }, times_direction, k == j,
                      times_direction ? "" : "angle " + std::to_string(k)});
   }
   out.push_back({"speed", -range.speed[j], range.speed[j], false,
-                 [j](const Motion& m) -> VectorXd { return m.qd.col(j); }, false, true});
+                 [j](const Motion& m) -> Eigen::Ref<const VectorXd> { return m.qd.col(j); }, false, true});
   out.push_back({"load", -torque, torque, true, load});
   out.push_back({"load", -torque, torque, true, load, true});
   if (range.duration >= kShortest)
-    out.push_back(
-        {"time", 0.0, range.duration, false, [](const Motion& m) -> VectorXd { return m.time; }, false, true, "time"});
+    out.push_back({"time", 0.0, range.duration, false,
+                   [](const Motion& m) -> Eigen::Ref<const VectorXd> { return m.time; }, false, true, "time"});
   for (const auto& [name, bounds] : range.columns) {
     if (name == "enabled" || is_of_payload(name) || !(bounds.second > bounds.first)) continue;
     out.push_back({name, bounds.first, bounds.second, false,
-                   [name = name](const Motion& m) -> VectorXd { return m.columns.at(name); }, false, false,
-                   "column " + name});
+                   [name = name](const Motion& m) -> Eigen::Ref<const VectorXd> { return m.columns.at(name); }, false,
+                   false, "column " + name});
   }
   return out;
 }

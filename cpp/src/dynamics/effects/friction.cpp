@@ -19,8 +19,10 @@ double per_speed(const MotionRange& range, std::size_t joint) {
   return torque_prior(range, joint) / std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
 }
 
-ArrayXd speed(const Motion& motion, std::size_t joint) { return motion.qd.col(static_cast<Index>(joint)); }
-ArrayXd direction(const Motion& motion, std::size_t joint) { return motion.direction.col(static_cast<Index>(joint)); }
+auto speed(const Motion& motion, std::size_t joint) { return motion.qd.col(static_cast<Index>(joint)).array(); }
+auto direction(const Motion& motion, std::size_t joint) {
+  return motion.direction.col(static_cast<Index>(joint)).array();
+}
 
 const char* const kCoulomb = "coulomb";
 const char* const kTurnSpeed = "turn_speed";
