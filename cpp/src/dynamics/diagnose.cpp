@@ -233,7 +233,7 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
                                         {{grams}, false, out.search->idle_flights(out.choice)});
     out = searched(flat_sums_of(again, noise, *free.design, threads), out.choice);
   }
-  out.choice = without_what_hides(out);
+  leave_out_what_hides(&out);
   if (!as_good_as_free(out, free)) return {};
   if (!bodies_can_do_it(problem, out)) return {};
   out.freed = freed(problem, out, limits.least_gain);
@@ -332,7 +332,7 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   Sums flat = flat_sums_of(grams, noise, *design, options.threads);
   Account free = account_of(design, with_priors(flat, *design, priors), nuisance, options.threads);
   free.choice = choice;
-  free.choice = without_what_hides(free);
+  leave_out_what_hides(&free);
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {
     std::vector<Noise> noise_of_functions = noise;
     const Account functions = with_functions(problem, account, of_account, limits, &noise_of_functions);

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "dynamics/beside.hpp"
+#include "dynamics/effects/families.hpp"
 #include "dynamics/judge.hpp"
 #include "dynamics/payload.hpp"
 #include "dynamics/remainder.hpp"
@@ -80,8 +81,7 @@ class Naming {
     return part * part / (part * part + kOtherLaws * kOtherLaws);
   }
 
-  /// Posterior of the class, and what is in it.
-  double probability(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
+  Posterior posterior(std::size_t at) const {
     const int g = choice_.groups[at];
     const TorqueGroup& mine = group_of(design_, g);
     const Choice rest = Search::without(choice_, at);
@@ -91,6 +91,7 @@ class Naming {
     const VectorXd theta = values_of(mine);
     std::set<std::pair<std::string, std::vector<std::string>>> seen;
     double in_class = 1.0, outside = std::exp(-kTempered * loss);
+    std::vector<TorqueAlternative> confounded;
     std::vector<Evidence::Gain> gains = search_.gains(rest);
     std::sort(gains.begin(), gains.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
     const auto explained_by = search_.evidence().explained(less, mine.columns, theta);
@@ -103,16 +104,16 @@ class Naming {
       const double r2 = explained_by(other.columns);
       if (r2 < kSameR2) continue;  // it explains something else
       if (behind < kClassNats || r2 > kClassR2) {
-        confounded->push_back({other.effect, other.joints, weight});
+        confounded.push_back({other.effect, other.joints, weight});
         in_class += weight;
       } else if (behind < 25.0) {
         outside += weight;
       }
     }
-    if (mine.family == TorqueFamily::inertia) add_one_scale(&in_class, confounded);
-    add_as_likely(mine, &in_class, confounded);
-    for (TorqueAlternative& alternative : *confounded) alternative.probability *= 1.0 / (in_class + outside);
-    return in_class / (in_class + outside);
+    if (mine.family == TorqueFamily::inertia) add_one_scale(&in_class, &confounded);
+    add_as_likely(mine, &in_class, &confounded);
+    for (TorqueAlternative& alternative : confounded) alternative.probability *= 1.0 / (in_class + outside);
+    return {in_class / (in_class + outside), std::move(confounded)};
   }
 
   /// Links, rotors and loads that are named beside each other may together be one factor of all drives' constants,
@@ -156,15 +157,10 @@ class Naming {
   }
 
   /// That it, or one of its class, is there: what decides whether it is named.
-  double sure(std::size_t at, std::vector<TorqueAlternative>* confounded) const {
-    return probability(at, confounded) * not_another_law(at);
-  }
+  double sure(std::size_t at, const Posterior& posterior) const { return posterior.probability * not_another_law(at); }
 
   /// It is surer than not. No posterior is above one, and it takes longer to find.
-  bool is_likely(std::size_t at) const {
-    std::vector<TorqueAlternative> ignored;
-    return not_another_law(at) >= kNamed && sure(at, &ignored) >= kNamed;
-  }
+  bool is_likely(std::size_t at) const { return not_another_law(at) >= kNamed && sure(at, posterior(at)) >= kNamed; }
 
   /// The named effect of whose law the free function number `at` is what the law lacks; null: of none. It makes the
   /// torque of the law as well, and removes less beside it than a part of what the law removes.
@@ -217,6 +213,24 @@ class Naming {
   Fit fit_;
   VectorXd squares_;  ///< of folds that were not fitted
 };
+
+/// What is asked when these of a choice's groups are named: the choice, and without what their names are judged.
+std::vector<Choice> asked_for(const TorqueDesign& design, const Choice& choice, const std::vector<std::size_t>& at) {
+  std::vector<Choice> out{choice, without_masses(design, choice)};
+  for (const std::size_t k : at) out.push_back(Search::without(choice, k));
+  return out;
+}
+
+/// Posteriors of these of an account's chosen groups, side by side.
+std::vector<Posterior> posteriors_of(const Account& account, const Naming& naming, const std::vector<std::size_t>& at) {
+  const Search& search = *account.search;
+  search.look_ahead(asked_for(*account.design, account.choice, at), Search::Ahead::squares);
+  search.share(account.choice);
+  std::vector<Posterior> out(at.size());
+  const auto ask = [&](std::size_t k) { out[k] = naming.posterior(at[k]); };
+  math::for_each_on_threads(out.size(), search.threads(), {}, ask, 1);
+  return out;
+}
 
 /// Fractions of the standard model's squares that the groups of a choice remove.
 class Shares {
@@ -434,15 +448,16 @@ std::vector<FoundTorqueEffect> found_effects(const Problem& problem, const Accou
     found.standard = group.standard && !problem.fitted_before && !account.inertias_given;
     found.parameters = parameters_of(design, group.columns, naming.fit());
     found.share = shares.of({k});
-    const double posterior = naming.probability(k, &found.confounded_with);
-    if (posterior * naming.not_another_law(k) < kNamed) {
+    const Posterior& posterior = account.posteriors[k];
+    found.confounded_with = posterior.confounded;
+    if (naming.sure(k, posterior) < kNamed) {
       found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
       too_small.push_back({std::move(found), k});
       continue;
     }
     const std::vector<Ground> grounds = grounds_of(naming, k, group, unknown);
-    found.probability = confidence(posterior, grounds);
-    found.grounds = grounds_told(posterior, grounds);
+    found.probability = confidence(posterior.probability, grounds);
+    found.grounds = grounds_told(posterior.probability, grounds);
     if (problem.single) found.probability = std::min(found.probability, kBlocksOfTime);
     found.rms = naming.weighted_rms(group) * noise_at(noise, group.joint);
     found.plain = find_torque_effect(group.effect, own).traits.plain;
@@ -473,16 +488,20 @@ std::vector<UnknownTorque> unknown_of(const Account& account, const Naming& nami
   const TorqueDesign& design = *account.design;
   const Choice& choice = account.choice;
   const Shares shares(account);
-  std::vector<UnknownTorque> out;
+  std::vector<std::size_t> functions;
   for (std::size_t k = 0; k < choice.groups.size(); ++k) {
+    if (group_of(design, choice.groups[k]).effect.empty()) functions.push_back(k);
+  }
+  const std::vector<Posterior> posteriors = posteriors_of(account, naming, functions);
+  std::vector<UnknownTorque> out;
+  for (std::size_t f = 0; f < functions.size(); ++f) {
+    const std::size_t k = functions[f];
     const TorqueGroup& group = group_of(design, choice.groups[k]);
-    if (!group.effect.empty()) continue;
     UnknownTorque unknown;
     unknown.joint = group.joints.front();
     unknown.inputs = group.inputs;
     unknown.share = shares.of({k});
-    std::vector<TorqueAlternative> ignored;
-    unknown.probability = naming.sure(k, &ignored);
+    unknown.probability = naming.sure(k, posteriors[f]);
     if (unknown.probability < kUnknown) continue;
     if (const TorqueGroup* law = naming.law_of(k)) {
       rest_of_laws->push_back(words_of_rest(*law, unknown));
@@ -661,35 +680,11 @@ std::vector<Parameter> parameters_in(const std::vector<FoundTorqueEffect>& effec
   return out;
 }
 
-/// What is left without anything that was named.
-TorqueErrors errors_without_names(const Problem& problem, const Account& account) {
+/// The model without anything that was named.
+TorqueModel without_names(const Problem& problem, const Account& account) {
   const Evidence::State state = account.search->state({});
   const Fit fit = fit_of(*account.sums, state.columns, state.precision);
-  return errors_of(problem, {{"usual", problem.nominal.with(valued(*account.design, fit))}}).front();
-}
-
-/// What is asked when these of a choice's groups are named: the choice, and without what their names are judged.
-std::vector<Choice> asked_for(const TorqueDesign& design, const Choice& choice, const std::vector<std::size_t>& at) {
-  std::vector<Choice> out{choice, without_masses(design, choice)};
-  for (const std::size_t k : at) out.push_back(Search::without(choice, k));
-  return out;
-}
-
-/// How sure each of a choice is.
-std::vector<double> sureness(const Account& account) {
-  const Search& search = *account.search;
-  std::vector<double> out(account.choice.groups.size());
-  std::vector<std::size_t> all(out.size());
-  std::iota(all.begin(), all.end(), 0);
-  search.look_ahead(asked_for(*account.design, account.choice, all), Search::Ahead::squares);
-  search.share(account.choice);
-  const Naming naming(account);
-  const auto ask = [&](std::size_t k) {
-    std::vector<TorqueAlternative> ignored;
-    out[k] = naming.sure(k, &ignored);
-  };
-  math::for_each_on_threads(out.size(), search.threads(), {}, ask, 1);
-  return out;
+  return problem.nominal.with(valued(*account.design, fit));
 }
 
 /// Whether without number `at` another one is likely that is not so beside it.
@@ -703,7 +698,7 @@ bool hides_another(const Account& account, const std::vector<double>& sure, std:
   return false;
 }
 
-/// The first of the unlikely ones that hides another. `sure`: by sureness().
+/// The first of the unlikely ones that hides another. `sure`: how sure each of the choice is.
 std::optional<std::size_t> first_that_hides(const Account& account, const std::vector<double>& sure,
                                             const std::vector<std::size_t>& unlikely) {
   if (unlikely.size() < 2) return {};
@@ -729,17 +724,21 @@ std::optional<std::size_t> first_that_hides(const Account& account, const std::v
 
 }  // namespace
 
-Choice without_what_hides(Account account) {
+void leave_out_what_hides(Account* account) {
   for (;;) {
-    const std::vector<double> sure = sureness(account);
-    std::vector<std::size_t> unlikely;
-    for (std::size_t k = 0; k < sure.size(); ++k) {
+    const Naming naming(*account);
+    std::vector<std::size_t> all(account->choice.groups.size()), unlikely;
+    std::iota(all.begin(), all.end(), 0);
+    account->posteriors = posteriors_of(*account, naming, all);
+    std::vector<double> sure;
+    for (const std::size_t k : all) {
+      sure.push_back(naming.sure(k, account->posteriors[k]));
       if (sure[k] < kNamed) unlikely.push_back(k);
     }
     std::sort(unlikely.begin(), unlikely.end(), [&](std::size_t a, std::size_t b) { return sure[a] < sure[b]; });
-    const std::optional<std::size_t> at = first_that_hides(account, sure, unlikely);
-    if (!at) return account.choice;
-    account.choice = Search::without(account.choice, *at);
+    const std::optional<std::size_t> at = first_that_hides(*account, sure, unlikely);
+    if (!at) return;
+    account->choice = Search::without(account->choice, *at);
   }
 }
 
@@ -786,7 +785,7 @@ std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice&
   const Naming naming(account);
   Choice likely, small;
   for (std::size_t k = 0; k < same.groups.size(); ++k) {
-    Choice& to = naming.is_likely(k) ? likely : small;
+    Choice& to = naming.sure(k, account.posteriors[k]) >= kNamed ? likely : small;
     to.groups.push_back(same.groups[k]);
     to.scales.push_back(same.scales[k]);
   }
@@ -795,11 +794,49 @@ std::pair<Choice, Choice> likely_and_small(const Account& account, const Choice&
 
 namespace {
 
+/// A model with something that has no name, and the joints at which it helps.
+struct Beyond {
+  std::vector<std::size_t> joints;
+  std::optional<TorqueModel> model{};  ///< none: nowhere
+};
+
+/// Free functions that help, and all that was fitted with these. `model`: the named robot's, over whose torque
+/// functions of the load were fitted.
+Beyond functions_beyond(const Problem& problem, Account functions, const TorqueModel& model, double least_gain) {
+  functions.choice = with_functions_that_help(problem, functions, model, least_gain);
+  std::set<std::size_t> joints;
+  for (const int g : functions.choice.groups) {
+    const TorqueGroup& group = group_of(*functions.design, g);
+    if (group.effect.empty()) joints.insert(static_cast<std::size_t>(group.joint));
+  }
+  if (joints.empty()) return {};
+  const Naming naming(functions);
+  std::vector<std::string> said_already;
+  const Robot robot = robot_of(problem, functions, naming, &said_already);
+  return {{joints.begin(), joints.end()},
+          with_free_functions(problem, robot, *functions.design, naming.fit()).seeing(model)};
+}
+
+/// A remainder at other joints at which it helps.
+Beyond remainders_beyond(const Problem& problem, const Account& account, const Naming& naming, const TorqueModel& model,
+                         const std::vector<std::size_t>& but) {
+  // So many columns bend to anything, and blocks of a single recording have more in common than recordings.
+  const double least_gain = problem.single ? 0.1 : 0.05;
+  std::vector<std::string> said_already;
+  const Fit handed_over = bodies_of(problem, *account.design, *account.sums, naming.fit(), &said_already);
+  Beyond out;
+  std::vector<ValuedTerm> terms;
+  for (const Remainder& one : remainders_beside(account, handed_over, least_gain)) {
+    if (std::find(but.begin(), but.end(), one.joint) != but.end()) continue;
+    out.joints.push_back(one.joint);
+    terms.insert(terms.end(), one.terms.begin(), one.terms.end());
+  }
+  if (!out.joints.empty()) out.model = model.with(terms).seeing(model);
+  return out;
+}
+
 /// Joints take their errors with another model.
-void take_errors(const Problem& problem, const TorqueModel& model, const std::set<std::size_t>& joints,
-                 TorqueErrors* out) {
-  if (joints.empty()) return;
-  const TorqueErrors with = errors_of(problem, {{out->model, model}}).front();
+void take_errors(const TorqueErrors& with, const std::vector<std::size_t>& joints, TorqueErrors* out) {
   for (const std::size_t j : joints) {
     out->held_out[j] = with.held_out[j];
     out->in_motion[j] = with.in_motion[j];
@@ -807,54 +844,25 @@ void take_errors(const Problem& problem, const TorqueModel& model, const std::se
   }
 }
 
-/// Of joints with free functions that help, errors of all that was fitted with these; the joints. `model`: the named
-/// robot's, over whose torque functions of the load were fitted.
-std::set<std::size_t> take_errors_with_functions(const Problem& problem, Account functions, const TorqueModel& model,
-                                                 double least_gain, TorqueErrors* out) {
-  functions.choice = with_functions_that_help(problem, functions, model, least_gain);
-  std::set<std::size_t> joints;
-  for (const int g : functions.choice.groups) {
-    const TorqueGroup& group = group_of(*functions.design, g);
-    if (group.effect.empty()) joints.insert(static_cast<std::size_t>(group.joint));
-  }
-  if (joints.empty()) return joints;
-  const Naming naming(functions);
-  std::vector<std::string> said_already;
-  const Robot robot = robot_of(problem, functions, naming, &said_already);
-  const TorqueModel whole = with_free_functions(problem, robot, *functions.design, naming.fit()).seeing(model);
-  take_errors(problem, whole, joints, out);
-  return joints;
-}
-
-/// Of other joints at which it helps, errors with a remainder; the joints.
-std::set<std::size_t> take_errors_with_remainders(const Problem& problem, const Account& account, const Naming& naming,
-                                                  const TorqueModel& model, const std::set<std::size_t>& but,
-                                                  TorqueErrors* out) {
-  // So many columns bend to anything, and blocks of a single recording have more in common than recordings.
-  const double least_gain = problem.single ? 0.1 : 0.05;
-  std::vector<std::string> said_already;
-  const Fit handed_over = bodies_of(problem, *account.design, *account.sums, naming.fit(), &said_already);
-  std::set<std::size_t> joints;
-  std::vector<ValuedTerm> terms;
-  for (const Remainder& one : remainders_beside(account, handed_over, least_gain)) {
-    if (but.count(one.joint)) continue;
-    joints.insert(one.joint);
-    terms.insert(terms.end(), one.terms.begin(), one.terms.end());
-  }
-  take_errors(problem, model.with(terms).seeing(model), joints, out);
-  return joints;
-}
-
-/// Errors of the named robot, and of joints at which they help with what has no name.
-void say_errors_with_unknown(const Problem& problem, const Account& account, const Naming& naming,
-                             const Account& functions, const TorqueModel& model, double least_gain,
-                             TorqueDiagnosis* out) {
-  TorqueErrors errors = out->errors.back();
-  errors.model = "with_unknown";
-  const std::set<std::size_t> joints = take_errors_with_functions(problem, functions, model, least_gain, &errors);
-  for (const std::size_t j : take_errors_with_remainders(problem, account, naming, model, joints, &errors))
-    out->remainders.push_back(errors.held_out[j].joint);
-  out->errors.push_back(std::move(errors));
+/// Errors of the nominal robot, of standard practice, of the named robot, and of this with what has no name at joints
+/// where that helps. Returns those without names: of `unnamed`; null: of standard practice.
+TorqueErrors say_errors(const Problem& problem, const TorqueModel& standard, const TorqueModel& named,
+                        const std::vector<Beyond>& unknown, const TorqueModel* unnamed,
+                        std::vector<TorqueErrors>* out) {
+  std::vector<std::pair<std::string, TorqueModel>> models{
+      {"nominal", problem.nominal}, {"standard", standard}, {"named", named}};
+  const std::size_t said = models.size();
+  if (unnamed) models.emplace_back("without_names", *unnamed);
+  for (const Beyond& one : unknown)
+    if (one.model) models.emplace_back("with_unknown", *one.model);
+  const std::vector<TorqueErrors> errors = errors_of(problem, models);
+  *out = {errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(said)};
+  out->push_back(out->back());
+  out->back().model = "with_unknown";
+  std::size_t next = unnamed ? said + 1 : said;
+  for (const Beyond& one : unknown)
+    if (one.model) take_errors(errors[next++], one.joints, &out->back());
+  return unnamed ? errors[said] : errors[1];
 }
 
 }  // namespace
@@ -881,9 +889,13 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   const Naming of_robot(handed_over);
   out.robot = robot_of(problem, handed_over, of_robot, &out.warnings);
   const TorqueModel model = model_of(out.robot, problem);
-  out.errors = errors_of(problem, {{"nominal", problem.nominal}, {"standard", groundwork.model}, {"named", model}});
-  say_errors_with_unknown(problem, handed_over, of_robot, functions, model, least_gain, &out);
-  const TorqueErrors before = account.inertias_given ? errors_without_names(problem, account) : out.errors[1];
+  const Beyond by_functions = functions_beyond(problem, functions, model, least_gain);
+  const Beyond by_remainders = remainders_beyond(problem, handed_over, of_robot, model, by_functions.joints);
+  for (const std::size_t j : by_remainders.joints) out.remainders.push_back(driven_name(problem.robot, j));
+  std::optional<TorqueModel> unnamed;
+  if (account.inertias_given) unnamed = without_names(problem, account);
+  const TorqueErrors before = say_errors(problem, groundwork.model, model, {by_functions, by_remainders},
+                                         unnamed ? &*unnamed : nullptr, &out.errors);
   out.without_names = mean_percent(before);
   out.verdict = verdict_of(out, before, any);
   out.sentence = verdict_sentence(out, words_of_usual(problem, account), problem.robot.driven_count());

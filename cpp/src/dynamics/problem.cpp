@@ -549,16 +549,35 @@ struct JointMoments {
 };
 using ModelMoments = std::vector<std::vector<JointMoments>>;  // by model and joint
 
-/// Of one tile, its rows in these folds.
-ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& models, const Folds& folds,
-                        Tile* tile) {
-  ModelMoments out;
+/// Of held-out rows, and of training rows.
+struct SplitMoments {
+  ModelMoments held_out, train;
+
+  SplitMoments() = default;
+  SplitMoments(std::size_t models, std::size_t joints)
+      : held_out(models, std::vector<JointMoments>(joints)), train(held_out) {}
+
+  void add(const SplitMoments& other) {
+    for (std::size_t m = 0; m < train.size(); ++m) {
+      for (std::size_t j = 0; j < train[m].size(); ++j) {
+        held_out[m][j].add(other.held_out[m][j]);
+        train[m][j].add(other.train[m][j]);
+      }
+    }
+  }
+};
+
+using Models = std::vector<std::pair<std::string, TorqueModel>>;
+
+SplitMoments moments_of(const Problem& problem, const Models& models, Tile* tile) {
+  SplitMoments out(models.size(), problem.robot.driven_count());
   const VectorXd time = tile->own_time();
-  for (const auto& [name, model] : models) {
-    const MatrixXd& predicted = kept_torque(model, tile);
-    std::vector<JointMoments> by_joint(static_cast<std::size_t>(predicted.cols()));
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const MatrixXd& predicted = kept_torque(models[m].second, tile);
     for (Index i = 0; i < tile->count; ++i) {
-      if (folds.fold(tile->recording, time[i]) < 0) continue;
+      const bool held_out = problem.test.fold(tile->recording, time[i]) >= 0;
+      if (!held_out && problem.train.fold(tile->recording, time[i]) < 0) continue;
+      std::vector<JointMoments>& by_joint = held_out ? out.held_out[m] : out.train[m];
       for (Index j = 0; j < predicted.cols(); ++j) {
         const double y = tile->measured(i, j);
         if (std::isnan(y)) continue;
@@ -567,40 +586,27 @@ ModelMoments moments_of(const std::vector<std::pair<std::string, TorqueModel>>& 
         if (tile->moving(i, j) > 0.0) joint.moving.add(y, predicted(i, j));
       }
     }
-    out.push_back(std::move(by_joint));
   }
-  return out;
-}
-
-/// By model and joint.
-ModelMoments moments_on(const Folds& folds, const Problem& problem,
-                        const std::vector<std::pair<std::string, TorqueModel>>& models) {
-  std::vector<ModelMoments> lot(Tiles::kTogether);
-  ModelMoments out(models.size(), std::vector<JointMoments>(problem.robot.driven_count()));
-  const auto add = [&](std::size_t k) {
-    for (std::size_t m = 0; m < models.size(); ++m)
-      for (std::size_t j = 0; j < out[m].size(); ++j) out[m][j].add(lot[k][m][j]);
-  };
-  problem.tiles.for_each([&](std::size_t r) { return folds.of_recording[r] >= 0; },
-                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(models, folds, &tile); }, add);
   return out;
 }
 
 }  // namespace
 
-std::vector<TorqueErrors> errors_of(const Problem& problem,
-                                    const std::vector<std::pair<std::string, TorqueModel>>& models) {
-  const ModelMoments held_out = moments_on(problem.test, problem, models);
-  const ModelMoments train = moments_on(problem.train, problem, models);
+std::vector<TorqueErrors> errors_of(const Problem& problem, const Models& models) {
+  std::vector<SplitMoments> lot(Tiles::kTogether);
+  SplitMoments all(models.size(), problem.robot.driven_count());
+  problem.tiles.for_each([](std::size_t) { return true; },
+                         [&](Tile& tile, std::size_t k) { lot[k] = moments_of(problem, models, &tile); },
+                         [&](std::size_t k) { all.add(lot[k]); });
   const std::vector<std::size_t> driven = problem.robot.driven_joints();
   std::vector<TorqueErrors> out(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     out[m].model = models[m].first;
     for (std::size_t j = 0; j < driven.size(); ++j) {
       const std::string& joint = problem.robot.joints[driven[j]].name;
-      out[m].held_out.push_back(held_out[m][j].all.error(joint));
-      out[m].in_motion.push_back(held_out[m][j].moving.error(joint));
-      out[m].train.push_back(train[m][j].all.error(joint));
+      out[m].held_out.push_back(all.held_out[m][j].all.error(joint));
+      out[m].in_motion.push_back(all.held_out[m][j].moving.error(joint));
+      out[m].train.push_back(all.train[m][j].all.error(joint));
     }
   }
   return out;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "math/batch.hpp"
+
 namespace truing::dynamics {
 namespace {
 
@@ -138,6 +140,27 @@ class Rest {
   VectorXd square_;
 };
 
+/// Terms of a joint beside the choice that gain on folds, with their values. `without`: `chosen` without each fold.
+std::vector<ValuedTerm> terms_beside(const TorqueDesign& design, std::size_t joint, const JointGrams& grams,
+                                     double design_effect, const std::vector<int>& in_choice, const VectorXd& chosen,
+                                     const std::vector<VectorXd>& without, double least_gain) {
+  const Others others = others_of(design, joint, grams, in_choice);
+  if (others.places.empty()) return {};
+  const Rest rest(grams, others, design_effect);
+  const std::vector<RidgeGains> gains = rest.gains(without);
+  const auto best = std::min_element(gains.begin(), gains.end(), [](const RidgeGains& a, const RidgeGains& b) {
+    return a.after().sum() < b.after().sum();
+  });
+  if (!Search::gains_on_folds(best->before, best->after(), least_gain)) return {};
+  const VectorXd values = best->shrink() * rest.fitted(chosen, kRidgeParts[best - gains.begin()]);
+  std::vector<ValuedTerm> out;
+  for (std::size_t k = 0; k < others.places.size(); ++k) {
+    const int column = grams.columns[static_cast<std::size_t>(others.places[k])];
+    out.push_back({design.terms[static_cast<std::size_t>(column)], values[static_cast<Index>(k)]});
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<Remainder> remainders_beside(const Account& account, const Fit& handed_over, double least_gain) {
@@ -145,27 +168,18 @@ std::vector<Remainder> remainders_beside(const Account& account, const Fit& hand
   const std::vector<FoldGram>& folds = account.sums->folds;
   const Evidence::State& state = account.search->state(account.choice);
   const VectorXd chosen = by_column(design, handed_over);
-  std::vector<VectorXd> chosen_without;
-  for (const FoldGram& fold : folds) chosen_without.push_back(handed_over_without(account, state, fold, chosen));
+  const int threads = account.search->threads();
+  std::vector<VectorXd> chosen_without(folds.size());
+  const auto refit = [&](std::size_t f) { chosen_without[f] = handed_over_without(account, state, folds[f], chosen); };
+  math::for_each_on_threads(folds.size(), threads, {}, refit, 1);
   const std::vector<JointGrams>& joints = *folds.front().joints();
-  std::vector<Remainder> out;
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const Others others = others_of(design, j, joints[j], state.columns);
-    if (others.places.empty()) continue;
-    const Rest rest(joints[j], others, folds.front().design_effect(j));
-    const std::vector<RidgeGains> gains = rest.gains(chosen_without);
-    const auto best = std::min_element(gains.begin(), gains.end(), [](const RidgeGains& a, const RidgeGains& b) {
-      return a.after().sum() < b.after().sum();
-    });
-    if (!Search::gains_on_folds(best->before, best->after(), least_gain)) continue;
-    const VectorXd values = best->shrink() * rest.fitted(chosen, kRidgeParts[best - gains.begin()]);
-    Remainder one{j, {}};
-    for (std::size_t k = 0; k < others.places.size(); ++k) {
-      const auto column = static_cast<std::size_t>(joints[j].columns[static_cast<std::size_t>(others.places[k])]);
-      one.terms.push_back({design.terms[column], values[static_cast<Index>(k)]});
-    }
-    out.push_back(std::move(one));
-  }
+  std::vector<Remainder> out(joints.size());
+  const auto fit = [&](std::size_t j) {
+    out[j] = {j, terms_beside(design, j, joints[j], folds.front().design_effect(j), state.columns, chosen,
+                              chosen_without, least_gain)};
+  };
+  math::for_each_on_threads(joints.size(), threads, {}, fit, 1);
+  out.erase(std::remove_if(out.begin(), out.end(), [](const Remainder& one) { return one.terms.empty(); }), out.end());
   return out;
 }
 

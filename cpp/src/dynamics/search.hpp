@@ -16,6 +16,7 @@
 #include "dynamics/problem.hpp"
 #include "estimation/evidence.hpp"
 #include "rooms.hpp"
+#include "truing/dynamics/diagnose.hpp"
 
 namespace truing::dynamics {
 
@@ -142,12 +143,19 @@ class Search {
   std::size_t joints_ = 1;
 };
 
+/// Of a chosen group: how likely it is that it, or another of its class, is there, and the others.
+struct Posterior {
+  double probability = 0.0;
+  std::vector<TorqueAlternative> confounded{};
+};
+
 /// A search with all that it stands on, and what it chose.
 struct Account {
   std::shared_ptr<const TorqueDesign> design;
   std::shared_ptr<const Sums> sums;
   std::shared_ptr<const Search> search;
   Choice choice{};
+  std::vector<Posterior> posteriors{};  ///< of what was chosen, where it was asked for (leave_out_what_hides)
   Choice small{};                       ///< fitted beside what was chosen, and too small to be named
   bool inertias_given = false;          ///< links' inertias are the file's, but for those that were chosen
   std::vector<FoldGram> held_out = {};  ///< recordings that nothing was fitted to: of what was chosen alone
