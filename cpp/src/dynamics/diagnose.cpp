@@ -9,12 +9,15 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "dynamics/columns.hpp"
 #include "dynamics/judge.hpp"
 #include "dynamics/name.hpp"
 #include "dynamics/search.hpp"
 #include "math/batch.hpp"
+#include "math/text.hpp"
 
 namespace truing {
 using namespace dynamics;
@@ -280,6 +283,38 @@ Account with_functions(const Problem& problem, const Account& of_effects, const 
   return out;
 }
 
+/// "armature.J4 = -0.35 kg m^2": the first parameter of a group beyond what machines have.
+std::string beyond_machines(const TorqueDesign& design, const Evidence::State& state, const TorqueGroup& group) {
+  for (std::size_t k = 0; k < state.columns.size(); ++k) {
+    const TorqueTerm& term = design.terms[static_cast<std::size_t>(state.columns[k])];
+    const double value = state.solution[static_cast<Eigen::Index>(k)];
+    const bool own = std::find(group.columns.begin(), group.columns.end(), state.columns[k]) != group.columns.end();
+    if (own && (value < term.least || value > term.most))
+      return term.parameter + " = " + math::number(value, 2) + (term.unit == "-" ? "" : " " + term.unit);
+  }
+  return {};
+}
+
+/// Of every joint without an unknown function, the best of what was refused: it has no name, but where it acts, and
+/// like what, is known.
+void say_refused(const Account& account, SearchLimits limits, TorqueDiagnosis* out) {
+  limits.least_gain = std::max(kLeastGainOfFunctions, limits.least_gain);
+  const Search& search = *account.search;
+  const double before = search.squares_of_folds(account.choice).sum();
+  std::set<std::string> said;
+  for (const UnknownTorque& one : out->unknown) said.insert(one.joint);
+  for (const Choice& one : search.refused(account.choice, limits)) {
+    const TorqueGroup& group = account.design->groups[static_cast<std::size_t>(one.groups.back())];
+    if (!said.insert(group.joints.empty() ? "" : group.joints.front()).second) continue;
+    const double part = std::min(1.0, (1.0 - search.squares_of_folds(one).sum() / before) * search.joints());
+    const std::string where = group.joints.empty() ? "" : " at " + math::listed(group.joints);
+    out->warnings.push_back("something that has no name acts like " + group.effect + where + " with " +
+                            beyond_machines(*account.design, search.state(one), group) +
+                            ", which no machine has: it would remove " + math::number(std::round(100.0 * part)) +
+                            " % of a joint's squared error on folds that were not fitted");
+  }
+}
+
 }  // namespace
 
 TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recordings,
@@ -336,7 +371,9 @@ TorqueDiagnosis diagnose(const Robot& robot, const std::vector<Recording>& recor
   const auto answer = [&](const Account& account, const TorqueModel& of_account) {
     std::vector<Noise> noise_of_functions = noise;
     const Account functions = with_functions(problem, account, of_account, limits, &noise_of_functions);
-    return named(problem, groundwork, account, noise, functions, noise_of_functions, limits.least_gain);
+    TorqueDiagnosis out = named(problem, groundwork, account, noise, functions, noise_of_functions, limits.least_gain);
+    if (limits.plausible_only) say_refused(account, limits, &out);
+    return out;
   };
   std::optional<Account> given;
   if (!problem.fitted_before) given = of_given_inertias(problem, *columns, std::move(flat), model, noise, free, limits);

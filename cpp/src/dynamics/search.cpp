@@ -238,7 +238,6 @@ bool Search::predicts(const VectorXd& before, const VectorXd& after, const Searc
   return gains_on_folds(before, after, limits.least_gain / static_cast<double>(joints_));
 }
 
-/// Parameters of the group within what machines have; what is beyond stands for something else.
 bool Search::is_plausible(const Evidence::State& state, int group) const {
   for (const int c : groups_[static_cast<std::size_t>(group)].columns) {
     const auto at = std::find(state.columns.begin(), state.columns.end(), c) - state.columns.begin();
@@ -320,15 +319,31 @@ Choice Search::less_what_is_idle(Choice choice, const SearchLimits& limits, bool
   return choice;
 }
 
-std::optional<Choice> Search::grown(const Choice& choice, const SearchLimits& limits, bool free_functions) const {
+std::vector<Choice> Search::winning(const Choice& choice, const SearchLimits& limits, bool free_functions) const {
   std::vector<Evidence::Gain> ranked = gains(choice, threads_);
   std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
-  std::vector<Choice> tries;
+  std::vector<Choice> out;
   for (const Evidence::Gain& gain : ranked) {
     if (gain.score < limits.threshold) break;
     if (may_enter(choice, gain.group, limits, free_functions))
-      tries.push_back(with_one_more(choice, gain.group, gain.scale));
+      out.push_back(with_one_more(choice, gain.group, gain.scale));
   }
+  return out;
+}
+
+std::vector<Choice> Search::refused(const Choice& choice, const SearchLimits& limits) const {
+  std::vector<Choice> tries = winning(choice, limits, false);
+  look_ahead(tries, Ahead::state);
+  const auto not_refused = [&](const Choice& one) {
+    return is_plausible(state(one), one.groups.back()) ||
+           !predicts(squares_of_folds(choice), squares_of_folds(one), limits);
+  };
+  tries.erase(std::remove_if(tries.begin(), tries.end(), not_refused), tries.end());
+  return tries;
+}
+
+std::optional<Choice> Search::grown(const Choice& choice, const SearchLimits& limits, bool free_functions) const {
+  const std::vector<Choice> tries = winning(choice, limits, free_functions);
   const VectorXd& squares = squares_of_folds(choice);
   for (std::size_t k = 0; k < tries.size(); ++k) {
     if (k % kTriesTogether == 0) {

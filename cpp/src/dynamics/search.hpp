@@ -78,6 +78,10 @@ class Search {
   /// Takes effects as long as they win; starts from `choice`.
   Choice run(Choice choice, const SearchLimits& limits, bool free_functions) const;
 
+  /// Groups beyond the choice that win and predict folds by parameters that no machine has, the best first: of each the
+  /// choice with it, the last group. They are never in an answer, but something that acts so is there.
+  std::vector<Choice> refused(const Choice& choice, const SearchLimits& limits) const;
+
   enum class Ahead { state, squares };
   /// Looks at choices side by side: their states, and their squares on folds, are known when somebody asks for them. On
   /// one thread nothing is looked at before it is asked for; no number depends on it.
@@ -120,6 +124,8 @@ class Search {
   Look& look(const Choice& choice) const;
   void fill_squares(const std::vector<Look*>& looks, int threads) const;
 
+  /// The choice with one more group that wins, the best first.
+  std::vector<Choice> winning(const Choice& choice, const SearchLimits& limits, bool free_functions) const;
   /// The choice with the best group that predicts folds; none: no group does.
   std::optional<Choice> grown(const Choice& choice, const SearchLimits& limits, bool free_functions) const;
   bool may_enter(const Choice& choice, int group, const SearchLimits& limits, bool free_functions) const;
@@ -129,6 +135,7 @@ class Search {
   Choice better_forms(Choice choice, const SearchLimits& limits) const;
   /// Of effects or, where these were searched for, of free functions.
   Choice less_what_is_idle(Choice choice, const SearchLimits& limits, bool free_functions) const;
+  /// Parameters of the group within what machines have; what is beyond stands for something else.
   bool is_plausible(const Evidence::State& state, int group) const;
   bool predicts(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const SearchLimits& limits) const;
 

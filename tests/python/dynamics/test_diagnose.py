@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,18 @@ def test_nothing_is_named_where_nothing_is_hidden() -> None:
     found = diagnose(simulated.nominal, simulated.recordings)
     assert beyond_standard(found) == []
     assert found.verdict == "none"
+
+
+def test_what_only_an_impossible_value_explains_is_said_and_not_named() -> None:
+    """Torques that lack 1.2 kg m^2 of a rotor: a controller may take its own away before it writes them."""
+    simulated = simulate_motion(seed=4, hidden={"armature": (["J3"], {"armature.J3": -1.2})})
+    found = diagnose(simulated.nominal, simulated.recordings)
+    assert "armature" not in [effect.effect for effect in found.effects]
+    (said,) = [one for one in found.warnings if "no machine has" in one]
+    value = re.search(r"acts like armature at J3 with armature\.J3 = (-[\d.]+) kg m\^2", said)
+    assert value is not None and float(value[1]) == pytest.approx(-1.2, rel=0.15)
+    nothing = simulate_motion(seed=4, hidden={})
+    assert not any("no machine has" in one for one in diagnose(nothing.nominal, nothing.recordings).warnings)
 
 
 def test_one_and_two_threads_give_the_same_bits() -> None:
