@@ -11,6 +11,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 namespace truing::math {
@@ -31,9 +32,8 @@ class Helpers {
     Call call{&run, most};
     {
       const std::lock_guard<std::mutex> lock(mutex_);
+      while (idle_ < most && started_ < std::max(most, threads_of_machine() - 1) && begins()) ++idle_, ++started_;
       calls_.push_back(&call);
-      for (; idle_ < most && started_ < std::max(most, threads_of_machine() - 1); ++idle_, ++started_)
-        std::thread([this] { help(); }).detach();
     }
     most == 1 ? wanted_.notify_one() : wanted_.notify_all();
     run();
@@ -48,6 +48,16 @@ class Helpers {
     std::size_t wanted;       ///< so many more helpers may begin
     std::size_t helpers = 0;  ///< are at it
   };
+
+  /// One more helper; false: the system has no thread to give, and the work is done by fewer.
+  bool begins() {
+    try {
+      std::thread([this] { help(); }).detach();
+    } catch (const std::system_error&) {
+      return false;
+    }
+    return true;
+  }
 
   void help() {
     std::unique_lock<std::mutex> lock(mutex_);
