@@ -84,7 +84,12 @@ TEST_CASE("a batch may be asked for out of a batch, and by several threads at on
   CHECK(done == 4 * 20 * 50);
 }
 
-#if !defined(__SANITIZE_THREAD__)  // which lets no forked process begin threads
+#if defined(__has_feature)
+#define HAS_FEATURE(name) __has_feature(name)
+#else
+#define HAS_FEATURE(name) 0
+#endif
+#if !defined(__SANITIZE_THREAD__) && !HAS_FEATURE(thread_sanitizer)  // which lets no forked process begin threads
 TEST_CASE("a forked process has helpers of its own") {
   const auto count = [] {
     std::atomic<int> done{0};
