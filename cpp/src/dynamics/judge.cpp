@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "math/batch.hpp"
 #include "math/text.hpp"
 
 namespace truing::dynamics {
@@ -170,9 +171,10 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
     first = std::min(first, one.begin);
     last = std::max(last, one.begin + seconds);
   }
-  for (const auto& [r, span] : looked_at) {
-    const auto [first, last] = span;
-    const auto draw = [&, r = r](Tile& tile) {
+  const std::vector<std::pair<std::size_t, std::pair<double, double>>> recordings(looked_at.begin(), looked_at.end());
+  const auto look = [&](std::size_t at) {
+    const std::size_t r = recordings[at].first;
+    const auto draw = [&](Tile& tile) {
       const VectorXd time = tile.own_time();
       const MatrixXd nominal = own_torque(problem.nominal, &tile);
       const MatrixXd before = own_torque(standard, &tile);
@@ -191,13 +193,14 @@ std::vector<TorqueTrace> traces_of(const Problem& problem, const TorqueModel& st
         }
       }
     };
-    for_each_tile(problem.tiles.recordings()[r], r, problem.robot, problem.tiles.options(),
-                  [&, first = first, last = last](Tile& tile) {
-                    const VectorXd time = tile.own_time();
-                    if (time[time.size() - 1] >= first && time[0] <= last) draw(tile);
-                    return time[0] <= last;
-                  });
-  }
+    const double first = recordings[at].second.first, last = recordings[at].second.second;
+    for_each_tile(problem.tiles.recordings()[r], r, problem.robot, problem.tiles.options(), [&](Tile& tile) {
+      const VectorXd time = tile.own_time();
+      if (time[time.size() - 1] >= first && time[0] <= last) draw(tile);
+      return time[0] <= last;
+    });
+  };
+  math::for_each_on_threads(recordings.size(), problem.tiles.threads(), {}, look, 1);
   return out;
 }
 

@@ -625,22 +625,23 @@ std::vector<TorqueClass> classes_of(const std::vector<FoundTorqueEffect>& effect
   return out;
 }
 
-/// A fit as it is handed over.
-Fit bodies_of(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Fit& fit,
+/// An account's fit as it is handed over: of bodies that there can be.
+Fit bodies_of(const Problem& problem, const Account& account, const Naming& naming,
               std::vector<std::string>* warnings) {
-  return problem.fitted_before ? fit : with_bodies(problem.robot, design, sums, fit, warnings);
+  if (problem.fitted_before) return naming.fit();
+  return with_bodies(problem.robot, *account.design, *account.sums, naming.fit(), warnings);
 }
 
-/// The robot with its groundwork, where it had none, and with further groups, of bodies that there can be.
-/// `inertias_given`: the groundwork has no inertias.
-Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Sums& sums, const Fit& fit,
-                      std::vector<int> groups, bool inertias_given, std::vector<std::string>* warnings) {
+/// The robot with its groundwork, where it had none, and with further groups. `inertias_given`: the groundwork has no
+/// inertias.
+Robot with_groundwork(const Problem& problem, const TorqueDesign& design, const Fit& fit, std::vector<int> groups,
+                      bool inertias_given) {
   for (std::size_t g = 0; g < design.groups.size() && !problem.fitted_before; ++g) {
     const TorqueGroup& group = design.groups[g];
     if (group.standard && !(inertias_given && is_inertial(group))) groups.push_back(static_cast<int>(g));
   }
   std::sort(groups.begin(), groups.end());
-  return applied(problem.robot, design, groups, bodies_of(problem, design, sums, fit, warnings), problem.range);
+  return applied(problem.robot, design, groups, fit, problem.range);
 }
 
 /// Groups of a choice that are effects.
@@ -666,11 +667,10 @@ TorqueModel with_free_functions(const Problem& problem, const Robot& robot, cons
   return model_of(robot, problem).with(functions);
 }
 
-/// The robot of an account, of bodies that there can be.
-Robot robot_of(const Problem& problem, const Account& account, const Naming& naming,
-               std::vector<std::string>* warnings) {
-  return with_groundwork(problem, *account.design, *account.sums, naming.fit(),
-                         effects_in(account.choice, *account.design), account.inertias_given, warnings);
+/// The robot of an account with this fit.
+Robot robot_of(const Problem& problem, const Account& account, const Fit& fit) {
+  return with_groundwork(problem, *account.design, fit, effects_in(account.choice, *account.design),
+                         account.inertias_given);
 }
 
 std::vector<Parameter> parameters_in(const std::vector<FoundTorqueEffect>& effects) {
@@ -812,18 +812,16 @@ Beyond functions_beyond(const Problem& problem, Account functions, const TorqueM
   if (joints.empty()) return {};
   const Naming naming(functions);
   std::vector<std::string> said_already;
-  const Robot robot = robot_of(problem, functions, naming, &said_already);
+  const Robot robot = robot_of(problem, functions, bodies_of(problem, functions, naming, &said_already));
   return {{joints.begin(), joints.end()},
           with_free_functions(problem, robot, *functions.design, naming.fit()).seeing(model)};
 }
 
-/// A remainder at other joints at which it helps.
-Beyond remainders_beyond(const Problem& problem, const Account& account, const Naming& naming, const TorqueModel& model,
-                         const std::vector<std::size_t>& but) {
+/// A remainder at other joints at which it helps. `handed_over`: the account's fit.
+Beyond remainders_beyond(const Problem& problem, const Account& account, const Fit& handed_over,
+                         const TorqueModel& model, const std::vector<std::size_t>& but) {
   // So many columns bend to anything, and blocks of a single recording have more in common than recordings.
   const double least_gain = problem.single ? 0.1 : 0.05;
-  std::vector<std::string> said_already;
-  const Fit handed_over = bodies_of(problem, *account.design, *account.sums, naming.fit(), &said_already);
   Beyond out;
   std::vector<ValuedTerm> terms;
   for (const Remainder& one : remainders_beside(account, handed_over, least_gain)) {
@@ -886,11 +884,11 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
   out.covariance = covariance_of(*account.design, naming.fit(), parameters_in(out.effects));
   // Errors are those of the robot that is handed over.
   const Account& handed_over = account.freed ? *account.freed : account;
-  const Naming of_robot(handed_over);
-  out.robot = robot_of(problem, handed_over, of_robot, &out.warnings);
+  const Fit fit = bodies_of(problem, handed_over, Naming(handed_over), &out.warnings);
+  out.robot = robot_of(problem, handed_over, fit);
   const TorqueModel model = model_of(out.robot, problem);
   const Beyond by_functions = functions_beyond(problem, functions, model, least_gain);
-  const Beyond by_remainders = remainders_beyond(problem, handed_over, of_robot, model, by_functions.joints);
+  const Beyond by_remainders = remainders_beyond(problem, handed_over, fit, model, by_functions.joints);
   for (const std::size_t j : by_remainders.joints) out.remainders.push_back(driven_name(problem.robot, j));
   std::optional<TorqueModel> unnamed;
   if (account.inertias_given) unnamed = without_names(problem, account);
@@ -914,7 +912,10 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
       if (!e.standard) e.probability = std::min(e.probability, kContradicted);
     for (UnknownTorque& u : out.unknown) u.probability = std::min(u.probability, kContradicted);
     std::vector<std::string> said_already;
-    out.robot = with_groundwork(problem, groundwork.design, groundwork.sums, groundwork.fit, {}, false, &said_already);
+    const Fit bodies = problem.fitted_before ? groundwork.fit
+                                             : with_bodies(problem.robot, groundwork.design, groundwork.sums,
+                                                           groundwork.fit, &said_already);
+    out.robot = with_groundwork(problem, groundwork.design, bodies, {}, false);
   }
   out.where = regimes_of(problem, groundwork.model, model);
   out.classes = classes_of(out.effects, own, payload_varies(problem.range));

@@ -41,7 +41,6 @@ VectorXd priors_of(const TorqueDesign& design) {
   return out;
 }
 
-constexpr std::size_t kLooksTogether = 2;  ///< that a thread takes
 constexpr std::size_t kTriesTogether = 4;  ///< that are looked at ahead: most are refused
 
 double squares_left(const Gram& gram, const VectorXd& solution) {
@@ -162,9 +161,8 @@ void Search::look_ahead(const std::vector<Choice>& choices, Ahead what) const {
     if (what == Ahead::squares && !judged) unjudged.push_back(look);
   }
   const auto evaluate = [&](std::size_t k) { fresh[k].second->state = evidence_.evaluate(*fresh[k].first); };
-  math::for_each_on_threads(fresh.size(), threads_, {}, evaluate, kLooksTogether);
-  // To begin another thread takes as long as to judge one choice.
-  fill_squares(unjudged, unjudged.size() > 1 ? threads_ : 1);
+  math::for_each_on_threads(fresh.size(), threads_, {}, evaluate, 1);
+  fill_squares(unjudged, threads_);
 }
 
 void Search::fill_squares(const std::vector<Look*>& looks, int threads) const {
