@@ -247,8 +247,7 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std
 }
 
 const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<MatrixXd>* made) const {
-  const bool known = !tile->memory.links.empty();
-  std::vector<MatrixXd>& place = kept_.empty() && !known ? *made : tile->memory.links;
+  std::vector<MatrixXd>& place = tiles_.are_kept() ? tile->memory.links : *made;
   if (place.empty()) place = filtered_links(chain_, *tile);
   return place;
 }

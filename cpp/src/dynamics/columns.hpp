@@ -46,7 +46,7 @@ class DesignColumns {
 
  private:
   void fill(Tile* tile, const std::function<bool(const TorqueTerm&, int column)>& wanted, Tables* tables) const;
-  /// The filtered columns of the links, kept with the tile where tables are.
+  /// The filtered columns of the links, kept with the tile where tiles are.
   const std::vector<Eigen::MatrixXd>& links_of(Tile* tile, std::vector<Eigen::MatrixXd>* made) const;
 
   const Tiles& tiles_;

@@ -274,7 +274,7 @@ namespace {
 MatrixXd torque_along(const TorqueModel& model, Tile* tile) {
   if (model.needs_rigid()) fill_rigid(&tile->motion);
   set_direction(model.turns(), tile);
-  MatrixXd out = model.torque_by_direction(&tile->motion, &tile->memory.undirected);
+  MatrixXd out = model.torque_by_direction(&tile->motion, &tile->memory.known);
   clear_tables(&tile->motion);
   return out;
 }

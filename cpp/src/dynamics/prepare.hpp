@@ -29,9 +29,9 @@ struct TileMemory {
   std::vector<FrictionTurn> turns;  ///< those of Motion::direction as it is
   /// Filtered columns of the inertial parameters, in the tile's own rows: by joint, those of the links that it feels.
   std::vector<Eigen::MatrixXd> links;
-  UndirectedTorque undirected;  ///< at every row of the motion
-  std::uint64_t model = 0;      ///< TorqueModel::number() of `torque`
-  Eigen::MatrixXd torque;       ///< in the tile's own rows
+  KnownTorque known;        ///< at every row of the motion
+  std::uint64_t model = 0;  ///< TorqueModel::number() of `torque`
+  Eigen::MatrixXd torque;   ///< in the tile's own rows
 };
 
 /// A stretch of a recording. Basis functions see every row of `motion`; the fit sees every `stride`-th row of what they
@@ -100,6 +100,7 @@ class Tiles {
   const std::vector<Recording>& recordings() const { return recordings_; }
   /// Rows that the fit sees of all tiles together, where these are kept; -1: they are made anew.
   Eigen::Index kept_rows() const;
+  bool are_kept() const { return kept_; }
   std::size_t kept_tiles() const { return tiles_.size(); }
   const Robot& robot() const { return robot_; }
   const PrepareOptions& options() const { return options_; }

@@ -122,18 +122,24 @@ TorqueModel TorqueModel::seeing(const TorqueModel& other) const {
   return out;
 }
 
-MatrixXd TorqueModel::torque_of_others(Motion* motion, UndirectedTorque* kept) const {
-  if (motion->bodies.size() != links_.size() || motion->bodies != links_) {  // else it is known what is carried
-    motion->carried = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
-    add_payload(*motion, &motion->carried);
-    motion->bodies = links_;
-  }
+void TorqueModel::carry(Motion* motion) const {
+  if (motion->bodies.size() == links_.size() && motion->bodies == links_) return;
+  motion->carried = chain_.torques(motion->q, motion->qd, motion->qdd, links_);
+  add_payload(*motion, &motion->carried);
+  motion->bodies = links_;
+}
+
+MatrixXd TorqueModel::torque_of_others(Motion* motion, KnownTorque* known) const {
+  carry(motion);
   MatrixXd out;
-  if (kept && kept->of == undirected_number_) {
-    out = kept->torque;
+  if (known && known->of == undirected_number_) {
+    out = known->undirected;
   } else {
     out = undirected_torque(*motion);
-    if (kept) *kept = {undirected_number_, out};
+    if (known) {
+      known->of = undirected_number_;
+      known->undirected = out;
+    }
   }
   add_terms(terms_, TermKind::directed, *motion, &out);
   return out;
@@ -150,17 +156,21 @@ MatrixXd TorqueModel::torque(Motion* motion) const {
   return torque_by_direction(motion);
 }
 
-MatrixXd TorqueModel::torque_by_direction(Motion* motion, UndirectedTorque* kept) const {
-  MatrixXd out = torque_of_others(motion, kept);
-  if (seen_ && same(seen_->turns_, turns_)) {
-    motion->torque = seen_->torque_of_others(motion);
-  } else if (seen_) {
-    const MatrixXd mine = std::exchange(motion->direction, directions_of(*motion, seen_->turns_));
-    motion->torque = seen_->torque_of_others(motion);
-    motion->direction = mine;
-  } else {
+MatrixXd TorqueModel::torque_by_direction(Motion* motion, KnownTorque* known) const {
+  MatrixXd out = torque_of_others(motion, known);
+  const TorqueModel& seen = seen_ ? *seen_ : *this;
+  if (!seen_) {
     motion->torque = out;
+  } else if (known && known->seen == seen.number_) {
+    seen.carry(motion);
+  } else if (same(seen.turns_, turns_)) {
+    motion->torque = seen.torque_of_others(motion);
+  } else {
+    const MatrixXd mine = std::exchange(motion->direction, directions_of(*motion, seen.turns_));
+    motion->torque = seen.torque_of_others(motion);
+    motion->direction = mine;
   }
+  if (known) known->seen = seen.number_;
   if (any(&TorqueTerm::needs_yielding))
     fill_yielding(motion, any(&TorqueTerm::needs_inertia));
   else if (any(&TorqueTerm::needs_inertia))

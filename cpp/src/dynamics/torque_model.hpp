@@ -31,10 +31,11 @@ void fill_yielding(Motion* motion, bool with_inertia);
 /// And Motion::rigid: they are large, and soon made again.
 void clear_tables(Motion* motion);
 
-/// Torques of a model but for its terms that look at the direction of friction or ask for the torque.
-struct UndirectedTorque {
-  std::uint64_t of = 0;  ///< number that models share which differ in how friction turns alone
-  Eigen::MatrixXd torque;
+/// What is known of a motion's torques.
+struct KnownTorque {
+  std::uint64_t of = 0;        ///< number that models share which differ in how friction turns alone …
+  Eigen::MatrixXd undirected;  ///< … and torques of theirs that neither look at the direction nor ask for the torque
+  std::uint64_t seen = 0;      ///< TorqueModel::number() of the one whose torque Motion::torque is
 };
 
 /// A robot's torques with the payload that the recording states, and a correction beside them.
@@ -54,8 +55,8 @@ class TorqueModel {
   /// Torques of every row [Nm | N], shape=(rows, joints). Sets Motion::direction to what this robot's friction knows of
   /// it, and Motion::torque to what the terms that ask for it see: the torques of all others.
   Eigen::MatrixXd torque(Motion* motion) const;
-  /// The same where Motion::direction is set already. `kept`: of this motion, from before and for the next time.
-  Eigen::MatrixXd torque_by_direction(Motion* motion, UndirectedTorque* kept = nullptr) const;
+  /// The same where Motion::direction is set already. `known`: of this motion, from before and for the next time.
+  Eigen::MatrixXd torque_by_direction(Motion* motion, KnownTorque* known = nullptr) const;
 
   const std::vector<FrictionTurn>& turns() const { return turns_; }
   /// Models of one number have the same torques.
@@ -67,8 +68,10 @@ class TorqueModel {
   const Robot& robot() const { return robot_; }
 
  private:
+  /// Sets Motion::bodies and Motion::carried to this model's.
+  void carry(Motion* motion) const;
   /// Of all but the terms that ask for the torque, by Motion::direction.
-  Eigen::MatrixXd torque_of_others(Motion* motion, UndirectedTorque* kept = nullptr) const;
+  Eigen::MatrixXd torque_of_others(Motion* motion, KnownTorque* known = nullptr) const;
   /// Of these the links, the rotors and the terms that do not look at the direction.
   Eigen::MatrixXd undirected_torque(const Motion& motion) const;
   void add(std::vector<ValuedTerm> more);
