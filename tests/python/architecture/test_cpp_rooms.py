@@ -76,7 +76,7 @@ ONLY_IN = {
     "urdf_": {"model/urdf.cpp"},
     "console_bridge/": {"model/urdf.cpp"},
     "tinyxml2": {"model/urdf.cpp"},
-    "thread": {"estimation/evaluate.cpp", "diagnosis/weigh.cpp", "math/batch.hpp"},
+    "thread": {"estimation/evaluate.cpp", "diagnosis/weigh.cpp", "math/batch.cpp"},
     "iostream": set[str](),  # the library prints nothing
 }
 INCLUDE_LINE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
