@@ -20,7 +20,6 @@ from truing.dynamics.api import identify
 from truing.dynamics.export.parts import NotWritten
 from truing.dynamics.recorded import Recorded
 from truing.errors import InputError
-from truing.model import AppliedEffect
 
 _ANEW = (
     "coulomb",
@@ -170,7 +169,7 @@ def with_friction_that_holds(
     return _fitted(robot, kept, where, _read_into_memory(recordings), cutoff, other_forms)
 
 
-def _elsewhere(effect: AppliedEffect, joints: Collection[str]) -> AppliedEffect:
+def _elsewhere(effect: _core.AppliedEffect, joints: Collection[str]) -> _core.AppliedEffect:
     """What an effect is at other joints than these."""
     return effect.replace(
         joints=[joint for joint in effect.joints if joint not in joints],
@@ -187,7 +186,7 @@ def _read_into_memory(recordings: Sequence[Recorded]) -> list[_core.Recording]:
 
 def _fitted(
     robot: _core.Robot,
-    kept: Sequence[AppliedEffect],
+    kept: Sequence[_core.AppliedEffect],
     where: Mapping[str, set[str]],
     recordings: Sequence[_core.Recording],
     cutoff: float | None,
