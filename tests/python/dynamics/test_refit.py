@@ -179,12 +179,10 @@ def test_friction_that_fades_at_rest_is_fitted_anew_as_one_that_holds(
 ) -> None:
     """At its joint alone: 7 Nm, which a fit that lets it fade would have put elsewhere."""
     fades = {"coulomb.J2": 3.0, "coulomb.J2.turn_travel": 1e-4, "coulomb.J2.turn_fade": 1.0}
-    effects = [
-        effect.replace(parameters={**effect.parameters, **fades})
-        if "coulomb.J2" in effect.parameters
-        else effect
-        for effect in simulated.truth.torque_effects
-    ]
+    dry = [effect for effect in simulated.truth.torque_effects if effect.effect == "coulomb"]
+    whole = {key: value for effect in dry for key, value in effect.parameters.items()}
+    one = AppliedEffect("coulomb", [joint for effect in dry for joint in effect.joints], {**whole, **fades})
+    effects = [one, *(effect for effect in simulated.truth.torque_effects if effect not in dry)]
     robot = simulated.truth.replace(torque_effects=effects)
     late = AppliedEffect("time_offset", [], {"time_offset": 0.0})  # of no joint
     kept = refit.with_friction_that_holds(robot.replace(torque_effects=[*effects, late]), trained, None)

@@ -154,7 +154,7 @@ def with_friction_that_holds(
     its laws in the forms that they have; of the rest only bodies move with it. recordings, cutoff: as of
     fit_without, whose errors are raised.
     """
-    joints = joints_with(robot, fading(robot))
+    joints = {_joint_of(parameter) for parameter in fading(robot)}
     where = {
         name: {j for e in robot.torque_effects if e.effect == name for j in e.joints} & joints
         for name in _AT_ITS_JOINT
@@ -163,17 +163,27 @@ def with_friction_that_holds(
         _elsewhere(effect, where[effect.effect]) if effect.effect in where else effect
         for effect in robot.torque_effects
     ]
-    forms = {f"{e.effect}.{key.split('.')[-1]}" for e in robot.torque_effects for key in e.parameters}
-    other_forms = [form for form in _FORMS if form not in forms]
+    forms = {
+        f"{effect.effect}.{parameter.rpartition('.')[2]}"
+        for effect in robot.torque_effects
+        for parameter in effect.parameters
+        if _joint_of(parameter) in joints
+    }
     kept = [effect for effect in kept if effect.parameters]
-    return _fitted(robot, kept, where, _read_into_memory(recordings), cutoff, other_forms)
+    given = _read_into_memory(recordings)
+    return _fitted(robot, kept, where, given, cutoff, [form for form in _FORMS if form not in forms])
+
+
+def _joint_of(parameter: str) -> str:
+    """ "J2" of coulomb.J2.turn_fade; "" of one that belongs to no joint."""
+    return parameter.split(".")[1] if "." in parameter else ""
 
 
 def _elsewhere(effect: _core.AppliedEffect, joints: Collection[str]) -> _core.AppliedEffect:
     """What an effect is at other joints than these."""
     return effect.replace(
         joints=[joint for joint in effect.joints if joint not in joints],
-        parameters={k: v for k, v in effect.parameters.items() if k.split(".")[1] not in joints},
+        parameters={k: v for k, v in effect.parameters.items() if _joint_of(k) not in joints},
     )
 
 
