@@ -176,15 +176,19 @@ bool as_good_as_free(const Account& given, const Account& free) {
 VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
   const Evidence::State& state = account.search->state(account.choice);
   const std::vector<FoldGram>& folds = account.sums->folds;
+  const auto fitted = [&](const Sums& sums, const Fit* near) {
+    std::vector<std::string> said_later;
+    const Fit fit = fit_of(sums, state.columns, state.precision);
+    return with_bodies(problem.robot, *account.design, sums, fit, &said_later, near);
+  };
+  const Fit to_all = fitted(*account.sums, nullptr);
   VectorXd out(static_cast<Eigen::Index>(folds.size()));
   const auto fit_without = [&](std::size_t f) {
-    std::vector<std::string> said_later;
     const Gram held = folds[f].of(state.columns);
     Sums others{{}, account.sums->all, account.sums->precision};
     others.all.xx(state.columns, state.columns) -= held.xx;
     others.all.xy(state.columns) -= held.xy;
-    const Fit fit = with_bodies(problem.robot, *account.design, others, fit_of(others, state.columns, state.precision),
-                                &said_later);
+    const Fit fit = fitted(others, &to_all);
     out[static_cast<Eigen::Index>(f)] = held.yy - 2.0 * fit.values.dot(held.xy) + fit.values.dot(held.xx * fit.values);
   };
   math::for_each_on_threads(folds.size(), problem.tiles.threads(), {}, fit_without, 1);

@@ -76,8 +76,8 @@ void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument("physical_inertias: " + message);
 }
 
-void check(const Robot& nominal, const MatrixXd& information, const VectorXd& gradient,
-           const PhysicalOptions& options) {
+void check(const Robot& nominal, const MatrixXd& information, const VectorXd& gradient, const PhysicalOptions& options,
+           const VectorXd& near) {
   validate(nominal);
   const auto n = static_cast<Index>(10 * nominal.joints.size());
   const std::string expected =
@@ -87,6 +87,8 @@ void check(const Robot& nominal, const MatrixXd& information, const VectorXd& gr
               std::to_string(information.cols()) + "), expected " + expected);
   require(gradient.size() == n,
           "the gradient has " + std::to_string(gradient.size()) + " values, expected " + expected);
+  require(near.size() == 0 || near.size() == n,
+          "near has " + std::to_string(near.size()) + " values, expected none or " + expected);
   require(information.allFinite(), "the information has a value that is not finite");
   require(gradient.allFinite(), "the gradient has a value that is not finite");
   const double size = information.cwiseAbs().maxCoeff();
@@ -241,6 +243,17 @@ VectorXd PhysicalObjective::parameters(const VectorXd& x) const {
   return out;
 }
 
+VectorXd PhysicalObjective::x_of(const VectorXd& parameters) const {
+  VectorXd out(parameters.size());
+  for (std::size_t link = 0; link < to_parameters_.size(); ++link) {
+    const Eigen::LLT<Matrix4d> nominal(pseudo_inertia(part(nominal_, link)));  // P = L (1 + X) L^T
+    const Matrix4d half = nominal.matrixL().solve(pseudo_inertia(part(parameters, link)));
+    const Matrix4d relative = nominal.matrixL().solve(half.transpose());
+    out.segment<10>(10 * static_cast<Index>(link)) = numbers_of(relative - Matrix4d::Identity());
+  }
+  return out;
+}
+
 VectorXd PhysicalObjective::nearest_body() const {
   constexpr double kInside = 0.03;
   VectorXd out(fit_.size());
@@ -273,8 +286,8 @@ double PhysicalObjective::pull(const VectorXd& x) const {
 double PhysicalObjective::increase(const VectorXd& x) const { return (root_ * (x - fit_)).squaredNorm(); }
 
 PhysicalInertias physical_inertias(const Robot& nominal, const MatrixXd& information, const VectorXd& gradient,
-                                   const PhysicalOptions& options) {
-  check(nominal, information, gradient, options);
+                                   const PhysicalOptions& options, const VectorXd& near) {
+  check(nominal, information, gradient, options, near);
   PhysicalInertias out;
   VectorXd start = link_parameters(nominal);
   for (std::size_t link = 0; link < nominal.joints.size(); ++link) {
@@ -283,12 +296,13 @@ PhysicalInertias physical_inertias(const Robot& nominal, const MatrixXd& informa
     start.segment<10>(10 * static_cast<Index>(link)) = to;
   }
   const PhysicalObjective objective(start, information, gradient);
-  VectorXd x = objective.nearest_body();
+  VectorXd x = near.size() > 0 ? objective.x_of(near) : objective.nearest_body();
+  const bool is_near = near.size() > 0 && objective.is_body(x);
   if (!objective.is_body(x)) x.setZero();  // so far from any body that its digits do not hold one
   // From where the border is far down to the prior's own weight.
   constexpr double kNats = 1e-9, kPath = 0.1;
   const double last = 1.0 / (options.spread * options.spread);
-  for (double weight = std::max(last, objective.pull(x));;) {
+  for (double weight = is_near ? last : std::max(last, objective.pull(x));;) {
     const bool final = weight <= last;
     const Iterations stage =
         newton(objective, weight, final ? kNats : kPath * weight, options.max_steps - out.steps, &x);

@@ -354,7 +354,7 @@ InertialPart inertial_part(const Robot& robot, const TorqueDesign& design, const
 
 // With the other columns eliminated (Schur complement), the inertial parameters' normal equations are H delta = g.
 Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& sums, const Fit& fit,
-                std::vector<std::string>* warnings) {
+                std::vector<std::string>* warnings, const Fit* near) {
   const InertialPart part = inertial_part(nominal, design, fit);
   if (part.inertial.empty()) return fit;
   const Gram gram = sums.all.of(fit.columns);
@@ -372,7 +372,12 @@ Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& su
   information(part.parameter, part.parameter) = H;
   VectorXd gradient = information * before;
   gradient(part.parameter) += g;
-  const PhysicalInertias bodies = physical_inertias(nominal, information, gradient);
+  VectorXd start;
+  if (near) {
+    start = before;
+    start(part.parameter) += near->values(part.inertial);
+  }
+  const PhysicalInertias bodies = physical_inertias(nominal, information, gradient, {}, start);
   for (const LiftedLink& link : bodies.lifted)
     warnings->push_back("no body can have the mass and inertia that the file gives the link of '" + link.joint +
                         "': the nearest that one can have was taken for a start");

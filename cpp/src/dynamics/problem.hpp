@@ -73,9 +73,10 @@ Eigen::VectorXd values_of(const TorqueGrams& grams, const std::vector<Noise>& no
                           const std::vector<bool>& wanted, int threads);
 
 /// The fit with inertial parameters that bodies can have, and the other values that go with them. `nominal`: the robot
-/// that the inertial columns add to. Links whose nominal no body could have are said in `warnings`.
+/// that the inertial columns add to. Links whose nominal no body could have are said in `warnings`. `near`: that of the
+/// same columns to nearly the same sums; it takes less time then.
 Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& sums, const Fit& fit,
-                std::vector<std::string>* warnings);
+                std::vector<std::string>* warnings, const Fit* near = nullptr);
 
 /// By column of the design: the fit's values, others nought.
 Eigen::VectorXd by_column(const TorqueDesign& design, const Fit& fit);

@@ -218,7 +218,7 @@ TEST_CASE("where the data say nothing the nominal stays") {
   information(20, 20) = 1e8;
   const PhysicalInertias moved =
       physical_inertias(nominal, information, information * (before + 2.0 * VectorXd::Unit(50, 20)));
-  CHECK(moved.parameters[20] == doctest::Approx(before[20] + 2.0).epsilon(1e-6));
+  CHECK(moved.parameters[20] == doctest::Approx(before[20] + 2.0).epsilon(1e-4));
   CHECK((moved.parameters - before).head(20).norm() < 1e-9);
   CHECK((moved.parameters - before).tail(20).norm() < 1e-9);
   CHECK(moved.distance[2] > 0.05);
@@ -258,6 +258,30 @@ TEST_CASE("a tighter prior stays nearer to the nominal") {
   }
 }
 
+TEST_CASE("from what fits nearly the same data the same bodies are found in fewer steps") {
+  int steps = 0, steps_from_afar = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    CAPTURE(seed);
+    std::mt19937_64 random(seed);
+    const Robot truth = linked_arm(Convention::urdf, seed), nominal = reweighted(truth, 0.3, &random);
+    const Data data(truth, 60, 3.0, &random), more(truth, 10, 3.0, &random);
+    const VectorXd near = physical_inertias(nominal, data.information, data.gradient).parameters;
+    const MatrixXd information = data.information + more.information;
+    const VectorXd gradient = data.gradient + more.gradient;
+    const PhysicalInertias far = physical_inertias(nominal, information, gradient),
+                           found = physical_inertias(nominal, information, gradient, {}, near);
+    CHECK(truing::math::converged(found.reason));
+    steps += found.steps;
+    steps_from_afar += far.steps;
+    CHECK((data.Y * (found.parameters - far.parameters)).norm() < 1e-4 * (data.Y * far.parameters).norm());
+    CHECK(found.increase == doctest::Approx(far.increase).epsilon(1e-4));
+    // No bodies: as if nothing were known.
+    CHECK(physical_inertias(nominal, information, gradient, {}, -near).increase ==
+          doctest::Approx(far.increase).epsilon(1e-4));
+  }
+  CHECK(2 * steps < steps_from_afar);
+}
+
 TEST_CASE("what cannot be used is refused in words") {
   const Robot robot = linked_arm(Convention::dh, 8);
   const MatrixXd H = MatrixXd::Identity(50, 50);
@@ -268,6 +292,8 @@ TEST_CASE("what cannot be used is refused in words") {
   };
   refused(MatrixXd::Identity(60, 60), g, "shape (60, 60), expected 50");
   refused(H, VectorXd::Zero(49), "49 values");
+  CHECK_THROWS_WITH_AS(physical_inertias(robot, H, g, {}, VectorXd::Ones(49)), doctest::Contains("near has 49 values"),
+                       std::invalid_argument);
   MatrixXd other = H;
   other(3, 4) = std::nan("");
   refused(other, g, "not finite");
