@@ -133,20 +133,24 @@ inline void add_columns(const RigidProgram& program, const RigidTile& tile, int 
   }
 }
 
+/// What joints' torques are felt as by the readings that move them: joint i's is added to those of `out`.
+inline void add_felt(const RigidProgram& program, const RigidTile& tile, int i, Pack torque, double* out) {
+  for (int k = 0; k < program.driven_count; ++k) {
+    const double by = program.coupling[i * program.driven_count + k];
+    if (by == 0.0) continue;
+    double* const felt = out + k * tile.column_stride;
+    store(felt, load(felt) + splat(by) * torque);
+  }
+}
+
 /// Newton and Euler (Luh, Walker and Paul 1980, eq. 4 to 6) of a link with mass p[0], first moment and inertia about
-/// its origin.
-inline void add_torques(const RigidProgram& program, const RigidTile& tile, int i, int first, const Moving& at,
-                        const double* p) {
+/// its origin: the force on it, and the moment about the base's origin behind it in `wrench`.
+inline void store_wrench(const Moving& at, const double* p, double* wrench) {
   const Vec moment_of_mass = at.turned(splat_vec(p + 1)), w = at.turned_back(at.w);
   const Vec force = splat(p[0]) * at.a + at.pull(moment_of_mass);
   const Vec turning = times_inertia(p + 4, at.turned_back(at.alpha)) + cross(w, times_inertia(p + 4, w));
-  const Vec moment = cross(moment_of_mass, at.a) + at.turned(turning) + cross(at.o, force);  // about the base's origin
-  for (int k = 0; k < program.driven_count; ++k) {
-    const double* twist = tile.scratch + 6 * kLanes * k;
-    double* out = tile.blocks[0] + k * tile.column_stride + first;
-    store(out,
-          (i > 0 ? load(out) : Pack{}) + dot(load_lanes(twist), moment) + dot(load_lanes(twist + 3 * kLanes), force));
-  }
+  store_lanes(wrench, force);
+  store_lanes(wrench + 3 * kLanes, cross(moment_of_mass, at.a) + at.turned(turning) + cross(at.o, force));
 }
 
 /// Calls joint(i, first, at) at every joint and out(i, first, at) for the link behind it, a few samples at a time.
@@ -183,9 +187,29 @@ void regressor(const RigidProgram& program, const RigidTile& tile) {
   sweep(program, tile, [&](int i, int first, const Moving& at) { add_columns(program, tile, i, first, at); });
 }
 
+/// Links in front carry those behind: wrenches are added up from the last link to the first, and felt by virtual work.
 void torque(const RigidProgram& program, const RigidTile& tile, const double* parameters) {
-  sweep(program, tile, [&](int i, int first, const Moving& at) {
-    add_torques(program, tile, i, first, at, parameters + kLinkColumns * i);
+  const auto place = [&](int i) { return tile.scratch + 12 * kLanes * i; };  // axis, its velocity; force, moment
+  const auto joint = [&](int i, int, const Moving& at) {
+    const bool revolute = program.links[i].revolute;
+    store_lanes(place(i), revolute ? at.z : Vec{});
+    store_lanes(place(i) + 3 * kLanes, revolute ? cross(at.o, at.z) : at.z);
+  };
+  const auto feel = [&](int first) {
+    double* const out = tile.blocks[0] + first;
+    for (int k = 0; k < program.driven_count; ++k) store(out + k * tile.column_stride, Pack{});
+    Vec force{}, moment{};
+    for (int i = program.link_count - 1; i >= 0; --i) {
+      const double* const at = place(i);
+      force = force + load_lanes(at + 6 * kLanes);
+      moment = moment + load_lanes(at + 9 * kLanes);
+      const Pack work = dot(load_lanes(at), moment) + dot(load_lanes(at + 3 * kLanes), force);
+      add_felt(program, tile, i, work, out);
+    }
+  };
+  sweep(program, tile, joint, [&](int i, int first, const Moving& at) {
+    store_wrench(at, parameters + kLinkColumns * i, place(i) + 6 * kLanes);
+    if (i + 1 == program.link_count) feel(first);
   });
 }
 
@@ -221,13 +245,7 @@ void weight(const RigidProgram& program, const RigidTile& tile, const double* pa
       mass = mass + splat(parameters[kLinkColumns * i]);
       const Vec axis = load_lanes(place(i)), o = load_lanes(place(i) + 3 * kLanes);
       const Vec way = program.links[i].revolute ? cross(axis, moment - mass * o) : mass * axis;  // of what is behind it
-      const Pack felt = dot(gravity, way);
-      for (int k = 0; k < driven; ++k) {
-        const double by = program.coupling[i * driven + k];
-        if (by == 0.0) continue;
-        double* const torque = out + k * tile.column_stride;
-        store(torque, load(torque) - splat(by) * felt);
-      }
+      add_felt(program, tile, i, -dot(gravity, way), out);
     }
   }
 }
@@ -308,16 +326,20 @@ struct Bodies {
   Wrench carried_along(Twist more) const { return {gyration.times(more.n), cross(more.n + more.n, momentum)}; }
 };
 
-inline Bodies operator+(const Bodies& a, const Bodies& b) {
-  return {a.mass + b.mass,         a.first + b.first,       a.inertia + b.inertia,
-          a.momentum + b.momentum, a.gyration + b.gyration, a.load + b.load};
+inline void add(const Bodies& more, Bodies* all) {
+  all->mass += more.mass;
+  all->first = all->first + more.first;
+  all->inertia = all->inertia + more.inertia;
+  all->momentum = all->momentum + more.momentum;
+  all->gyration = all->gyration + more.gyration;
+  all->load = all->load + more.load;
 }
 
 /// A link with ten parameters p that moves with v and accelerates with a.
-inline Bodies body(const Moving& at, Twist v, Twist a, const double* p) {
+inline void set_body(const Moving& at, Twist v, Twist a, const double* p, Bodies* body) {
   const Pack zero{}, one = splat(1.0);
   const Vec ex{one, zero, zero}, ey{zero, one, zero}, ez{zero, zero, one};
-  Bodies out;
+  Bodies& out = *body;
   out.mass = splat(p[0]);
   const Vec m = at.turned(splat_vec(p + 1));
   out.first = m + out.mass * at.o;
@@ -337,7 +359,6 @@ inline Bodies body(const Moving& at, Twist v, Twist a, const double* p) {
     return cross(v.n, column + column - trace * unit) - cross(out.first + out.first, cross(v.v, unit));
   };
   out.gyration = {gyration(out.inertia.x, ex), gyration(out.inertia.y, ey), gyration(out.inertia.z, ez)};
-  return out;
 }
 
 /// A joint: its axis, and how the link before it moves.
@@ -350,48 +371,38 @@ struct JointLoad {
   Vec gyration;
 };
 
-template <class T>
-inline T kept(const double* place) {
-  T out;
-  std::memcpy(&out, place, sizeof out);
-  return out;
-}
-template <class T>
-inline void keep(double* place, const T& what) {
-  std::memcpy(place, &what, sizeof what);
-}
+/// What is found of a link on the way. It stays where it is: GCC copies what is so large a word at a time.
+struct __attribute__((may_alias)) Found {
+  JointMotion motion;
+  JointLoad load;
+  Bodies all;  ///< the link and, in the end, those behind it
+};
+static_assert(sizeof(Found) == 58 * kLanes * sizeof(double) && kLanes <= kSampleMultiple, "as rigid_scratch() has it");
 
-constexpr int kNumbersOfLink = 58 * kLanes;
-static_assert(sizeof(JointMotion) + sizeof(JointLoad) + sizeof(Bodies) == kNumbersOfLink * sizeof(double),
-              "as rigid_scratch() has it");
-inline double* motion_place(const RigidTile& tile, int i) { return tile.scratch + kNumbersOfLink * i; }
-inline double* load_place(const RigidTile& tile, int i) {
-  return motion_place(tile, i) + sizeof(JointMotion) / sizeof(double);
+/// Of every link, where the scratch begins that packs may stand at.
+inline Found* found(const RigidTile& tile) {
+  const auto begin = reinterpret_cast<std::uintptr_t>(tile.scratch);
+  return reinterpret_cast<Found*>((begin + alignof(Found) - 1) / alignof(Found) * alignof(Found));
 }
-inline double* bodies_place(const RigidTile& tile, int i) {
-  return load_place(tile, i) + sizeof(JointLoad) / sizeof(double);
-}
-inline Twist axis_of(const RigidTile& tile, int i) { return kept<Twist>(motion_place(tile, i)); }
 
 /// Of every link that of all behind it as well; of every joint what it takes of them.
-inline void add_up_bodies(const RigidProgram& program, const RigidTile& tile) {
+inline void add_up_bodies(const RigidProgram& program, Found* links) {
   for (int i = program.link_count - 1; i >= 0; --i) {
-    Bodies all = kept<Bodies>(bodies_place(tile, i));
-    if (i + 1 < program.link_count) all = all + kept<Bodies>(bodies_place(tile, i + 1));
-    keep(bodies_place(tile, i), all);
-    const Twist axis = axis_of(tile, i);
-    keep(load_place(tile, i), JointLoad{all.times(axis), all.gyration.transposed_times(axis.n) +
-                                                             cross(all.momentum + all.momentum, axis.v)});
+    Bodies& all = links[i].all;
+    if (i + 1 < program.link_count) add(links[i + 1].all, &all);
+    const Twist& axis = links[i].motion.axis;
+    links[i].load.inertia = all.times(axis);
+    links[i].load.gyration = all.gyration.transposed_times(axis.n) + cross(all.momentum + all.momentum, axis.v);
   }
 }
 
 /// Adds what joint m by `by` adds to a reading's columns: what the torques change by when it moves otherwise, and what
 /// they are for an acceleration of one. Seen from the links behind it their velocity changes by `more`, their
 /// acceleration by `pull` and more x v, and the wrench on them turns with them.
-inline void add_change(const RigidProgram& program, const RigidTile& tile, int m, double by, const Pack* change,
-                       double* changes, double* masses) {
-  const JointMotion at = kept<JointMotion>(motion_place(tile, m));
-  const Bodies all = kept<Bodies>(bodies_place(tile, m));
+inline void add_change(const RigidProgram& program, const RigidTile& tile, const Found* links, int m, double by,
+                       const Pack* change, double* changes, double* masses) {
+  const JointMotion& at = links[m].motion;
+  const Bodies& all = links[m].all;
   const Twist swept = cross(at.v, at.axis);
   const Pack angle = splat(by) * change[0], rate = splat(by) * change[1], acceleration = splat(by) * change[2];
   const Twist more = angle * swept + rate * at.axis;
@@ -402,11 +413,11 @@ inline void add_change(const RigidProgram& program, const RigidTile& tile, int m
   for (int l = 0; l < program.link_count; ++l) {
     Pack felt, mass;
     if (l <= m) {
-      const Twist axis = axis_of(tile, l);
+      const Twist& axis = links[l].motion.axis;
       felt = dot(axis, wrench);
       mass = dot(axis, inertia);
     } else {
-      const JointLoad load_of_joint = kept<JointLoad>(load_place(tile, l));
+      const JointLoad& load_of_joint = links[l].load;
       felt = dot(pull, load_of_joint.inertia) + dot(more.n, load_of_joint.gyration);
       mass = splat(by) * dot(at.axis, load_of_joint.inertia);
     }
@@ -422,8 +433,9 @@ inline void add_change(const RigidProgram& program, const RigidTile& tile, int m
 
 void torque_change(const RigidProgram& program, const RigidTile& tile, const double* parameters, const double* change) {
   const int driven = program.driven_count;
+  Found* const links = found(tile);
   const auto add_changes = [&](int first) {
-    add_up_bodies(program, tile);
+    add_up_bodies(program, links);
     for (int k = 0; k < driven; ++k) {
       double* const changes = tile.blocks[k] + first;
       double* const masses = tile.blocks[driven + k] ? tile.blocks[driven + k] + first : nullptr;
@@ -435,7 +447,7 @@ void torque_change(const RigidProgram& program, const RigidTile& tile, const dou
       for (int d = 0; d < 3; ++d) of_reading[d] = load(change + (d * driven + k) * tile.stride + first);
       for (int m = 0; m < program.link_count; ++m) {
         const double by = program.coupling[m * driven + k];
-        if (by != 0.0) add_change(program, tile, m, by, of_reading, changes, masses);
+        if (by != 0.0) add_change(program, tile, links, m, by, of_reading, changes, masses);
       }
     }
   };
@@ -447,13 +459,13 @@ void torque_change(const RigidProgram& program, const RigidTile& tile, const dou
       a = {nothing, nothing - splat_vec(program.gravity)};
     }
     const Twist axis = program.links[i].revolute ? Twist{at.z, cross(at.o, at.z)} : Twist{nothing, at.z};
-    keep(motion_place(tile, i), JointMotion{axis, v, a});
+    links[i].motion = {axis, v, a};
     const std::ptrdiff_t row = i * tile.stride + first;
     a = a + load(tile.acceleration + row) * axis + load(tile.rate + row) * cross(v, axis);
     v = v + load(tile.rate + row) * axis;
   };
   sweep(program, tile, joint, [&](int i, int first, const Moving& at) {
-    keep(bodies_place(tile, i), body(at, v, a, parameters + kLinkColumns * i));
+    set_body(at, v, a, parameters + kLinkColumns * i, &links[i].all);
     if (i + 1 == program.link_count) add_changes(first);
   });
 }

@@ -41,7 +41,7 @@ struct RigidTile {
 };
 
 constexpr std::size_t rigid_scratch(int links, int driven) {
-  return kSampleMultiple * (12 * static_cast<std::size_t>(driven) + 58 * static_cast<std::size_t>(links));
+  return kSampleMultiple * (12 * static_cast<std::size_t>(driven) + 58 * static_cast<std::size_t>(links) + 1);
 }
 
 struct RigidFunctions {
