@@ -46,26 +46,12 @@ Eigen::VectorXd low_pass(double cutoff, double step) {
 
 namespace {
 
-/// So many at a time, so that lanes look at several at once.
-bool is_zero(const double* x, Eigen::Index count) {
-  constexpr Eigen::Index kTogether = 16;
-  Eigen::Index k = 0;
-  for (; k + kTogether <= count; k += kTogether)
-    if (Eigen::Map<const Eigen::Array<double, kTogether, 1>>(x + k).abs().sum() != 0.0) return false;
-  return std::all_of(x + k, x + count, [](double value) { return value == 0.0; });
-}
-
 /// `count` outputs, as many as kernels take together, of rows from x on.
 void filter_rows(const double* x, const Eigen::VectorXd& weights, Eigen::Index stride, Eigen::Index count,
                  double* out) {
   thread_local std::vector<double> scratch;
   const auto taps = static_cast<int>(weights.size()), step = static_cast<int>(stride), all = static_cast<int>(count);
-  // Many columns act now and then only: beside a knot, while a play is crossed.
-  if (is_zero(x, (count - 1) * stride + taps)) {
-    std::fill_n(out, count, 0.0);
-    return;
-  }
-  scratch.resize(kernel::filter_scratch(step, taps, all));
+  scratch.resize(std::max(scratch.size(), kernel::filter_scratch(step, taps, all)));
   kernel::functions().filter(x, step, weights.data(), taps, all, scratch.data(), out);
 }
 
@@ -73,16 +59,14 @@ void filter_rows(const double* x, const Eigen::VectorXd& weights, Eigen::Index s
 
 void filter_column(const double* x, Eigen::Index rows, const Eigen::VectorXd& weights, Eigen::Index stride,
                    Eigen::Index first, Eigen::Index count, double* out) {
-  constexpr Eigen::Index kTogether = 64, kFew = kernel::kSampleMultiple;
+  constexpr Eigen::Index kTogether = 512, kFew = kernel::kSampleMultiple;
   thread_local std::vector<double> reached;
   const Eigen::Index taps = weights.size(), half = taps / 2;
   for (Eigen::Index done = 0; done < count;) {
-    const Eigen::Index begin = (first + done) * stride - half, left = count - done;
-    const auto is_inside = [&](Eigen::Index some) {
-      return some <= left && begin >= 0 && begin + (some - 1) * stride + taps <= rows;
-    };
-    const Eigen::Index some = is_inside(kTogether) ? kTogether : kFew;
-    if (is_inside(some)) {
+    const Eigen::Index begin = (first + done) * stride - half, left = count - done, room = rows - taps - begin;
+    const Eigen::Index inside = begin < 0 || room < 0 ? 0 : std::min({left, room / stride + 1, kTogether});
+    const Eigen::Index some = std::max(kFew, inside / kFew * kFew);
+    if (some <= inside) {
       filter_rows(x + begin, weights, stride, some, out + done);
     } else {  // at the column's ends
       double sums[kFew];

@@ -7,6 +7,7 @@
 
 #include "kernel.hpp"
 
+#include <cstdint>
 #include <cstring>
 
 #include "lanes.hpp"
@@ -339,12 +340,23 @@ std::size_t gram_size(int columns) {
   return size;
 }
 
-bool is_zero(const double* x, int length) {
-  for (int k = 0; k < length; k += kLanes) {
-    const Mask here = load(x + k) != 0.0;
+// So many packs are looked at before anything is decided.
+bool is_zero(const double* x, std::ptrdiff_t length) {
+  constexpr int kPacks = 4;
+  std::ptrdiff_t k = 0;
+  for (; k + kPacks * kLanes <= length; k += kPacks * kLanes) {
+    Mask bits{};
+    for (int m = 0; m < kPacks; ++m) {
+      Mask here;
+      std::memcpy(&here, x + k + m * kLanes, sizeof here);
+      bits |= here;
+    }
+    bits <<= 1;  // the sign
     for (int l = 0; l < kLanes; ++l)
-      if (here[l] != 0) return false;
+      if (bits[l] != 0) return false;
   }
+  for (; k < length; ++k)
+    if (x[k] != 0.0) return false;
   return true;
 }
 
@@ -461,63 +473,98 @@ void add_squared(const double* c, std::ptrdiff_t stride, const double* row, int 
   }
 }
 
-// Filter: rows side by side, so that a row's sum goes through the weights in their order whatever its lane. So many
-// sums at a time hide that each waits for itself.
-constexpr int kFilterPacks = 8;
-
-template <int packs>
-inline void filter_rows(const double* phases, std::ptrdiff_t length, int step, const double* weights, int weight_count,
-                        double* out) {
-  Pack sum[packs];
-  for (int m = 0; m < packs; ++m) sum[m] = Pack{};
-  for (int k = 0, phase = 0, row = 0; k < weight_count; ++k) {
-    const double* x = phases + phase * length + row;
-    for (int m = 0; m < packs; ++m) sum[m] += weights[k] * load(x + m * kLanes);
-    if (++phase == step) {
-      phase = 0;
-      ++row;
+#if TRUING_LANES == 8 && (defined(__clang__) || __GNUC__ >= 12)
+#define TRUING_TRANSPOSES
+// Eight packs: lane l of number k becomes lane k of number l. Blocks of one, of two and of four numbers change places.
+inline void transpose(Pack* v) {
+  Pack one[8], two[8];
+  for (int k = 0; k < 8; k += 2) {
+    one[k] = __builtin_shufflevector(v[k], v[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+    one[k + 1] = __builtin_shufflevector(v[k], v[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+  }
+  for (int k = 0; k < 8; k += 4) {
+    for (int i = k; i < k + 2; ++i) {
+      two[i] = __builtin_shufflevector(one[i], one[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+      two[i + 2] = __builtin_shufflevector(one[i], one[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
     }
   }
-  for (int m = 0; m < packs; ++m) store(out + m * kLanes, sum[m]);
-}
-
-#if TRUING_LANES == 8 && (defined(__clang__) || __GNUC__ >= 12)
-#define TRUING_PARTS_BY_FOUR
-// 32 numbers, every fourth one together: out[phase * length + i] = x[4 i + phase].
-inline void part_by_four(const double* x, std::ptrdiff_t length, double* out) {
-  const Pack a = load(x), b = load(x + 8), c = load(x + 16), d = load(x + 24);
-  const Pack ab_low = __builtin_shufflevector(a, b, 0, 4, 8, 12, 1, 5, 9, 13);
-  const Pack cd_low = __builtin_shufflevector(c, d, 0, 4, 8, 12, 1, 5, 9, 13);
-  const Pack ab_high = __builtin_shufflevector(a, b, 2, 6, 10, 14, 3, 7, 11, 15);
-  const Pack cd_high = __builtin_shufflevector(c, d, 2, 6, 10, 14, 3, 7, 11, 15);
-  store(out, __builtin_shufflevector(ab_low, cd_low, 0, 1, 2, 3, 8, 9, 10, 11));
-  store(out + length, __builtin_shufflevector(ab_low, cd_low, 4, 5, 6, 7, 12, 13, 14, 15));
-  store(out + 2 * length, __builtin_shufflevector(ab_high, cd_high, 0, 1, 2, 3, 8, 9, 10, 11));
-  store(out + 3 * length, __builtin_shufflevector(ab_high, cd_high, 4, 5, 6, 7, 12, 13, 14, 15));
+  for (int k = 0; k < 4; ++k) {
+    v[k] = __builtin_shufflevector(two[k], two[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    v[k + 4] = __builtin_shufflevector(two[k], two[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
 }
 #endif
 
+// Filter: every lane goes through a part of the rows, so that a weight meets numbers that stand as packs do, and a
+// row's sum goes through the weights in their order whatever its lane. out[n]: the n-th number that each lane needs.
+inline void lay_side_by_side(const double* x, std::ptrdiff_t part, std::ptrdiff_t length, double* out) {
+#ifdef TRUING_TRANSPOSES
+  for (std::ptrdiff_t n = 0; n < length && length >= kLanes; n += kLanes) {
+    const std::ptrdiff_t at = n + kLanes <= length ? n : length - kLanes;
+    Pack here[kLanes];
+    for (int l = 0; l < kLanes; ++l) here[l] = load(x + l * part + at);
+    transpose(here);
+    for (int k = 0; k < kLanes; ++k) store(out + (at + k) * kLanes, here[k]);
+  }
+  if (length >= kLanes) return;
+#endif
+  for (std::ptrdiff_t n = 0; n < length; ++n)
+    for (int l = 0; l < kLanes; ++l) out[n * kLanes + l] = x[l * part + n];
+}
+
+// Some rows of every lane; several at a time hide that each waits for itself. Lanes' parts have so many rows.
+template <int rows>
+inline void filter_rows(const double* side_by_side, int step, const double* weights, int weight_count,
+                        std::ptrdiff_t part, double* out) {
+  Pack sum[rows];
+  const double* x[rows];
+  for (int m = 0; m < rows; ++m) {
+    x[m] = side_by_side + std::ptrdiff_t{m} * step * kLanes;
+    sum[m] = weights[0] * load(x[m]);
+  }
+  for (int k = 1; k < weight_count; ++k)
+    for (int m = 0; m < rows; ++m) sum[m] += weights[k] * load(x[m] + std::ptrdiff_t{k} * kLanes);
+#ifdef TRUING_TRANSPOSES
+  if (rows == kLanes) {
+    transpose(sum);
+    for (int l = 0; l < kLanes; ++l) store(out + l * part, sum[l % rows]);
+    return;
+  }
+#endif
+  for (int m = 0; m < rows; ++m)
+    for (int l = 0; l < kLanes; ++l) out[l * part + m] = sum[m][l];
+}
+
+void filter_all(const double* x, int step, const double* weights, int weight_count, int count, double* scratch,
+                double* out) {
+  constexpr int kTogether = 8;
+  const std::ptrdiff_t part = count / kLanes, length = (part - 1) * step + weight_count;
+  const auto begin = reinterpret_cast<std::uintptr_t>(scratch), whole = std::uintptr_t{alignof(Pack)};
+  double* const side_by_side = reinterpret_cast<double*>((begin + whole - 1) / whole * whole);
+  lay_side_by_side(x, part * step, length, side_by_side);
+  std::ptrdiff_t row = 0;
+  for (; row + kTogether <= part; row += kTogether)
+    filter_rows<kTogether>(side_by_side + row * step * kLanes, step, weights, weight_count, part, out + row);
+  for (; row < part; ++row)
+    filter_rows<1>(side_by_side + row * step * kLanes, step, weights, weight_count, part, out + row);
+}
+
+// Many columns act now and then only: beside a knot, while a play is crossed. What is nought beyond is not summed.
 void filter(const double* x, int step, const double* weights, int weight_count, int count, double* scratch,
             double* out) {
-  const std::ptrdiff_t length = count + weight_count / step + 1,
-                       last = (count - 1) * std::ptrdiff_t{step} + weight_count;
-  std::ptrdiff_t parted = 0;
-#ifdef TRUING_PARTS_BY_FOUR
-  for (; step == 4 && 4 * (parted + kLanes) <= last; parted += kLanes)  // what most recordings need
-    part_by_four(x + 4 * parted, length, scratch + parted);
-#endif
-  for (std::ptrdiff_t phase = 0; phase < step; ++phase) {
-    double* const to = scratch + phase * length;
-    const double* from = x + phase + parted * step;
-    const std::ptrdiff_t there = (last - phase + step - 1) / step;  // at most `length`
-    for (std::ptrdiff_t i = parted; i < there; ++i, from += step) to[i] = *from;
-    for (std::ptrdiff_t i = there; i < length; ++i) to[i] = 0.0;
+  constexpr int kLooked = 64;
+  const auto rows_from = [&](int row) { return count - row < kLooked ? count - row : kLooked; };
+  const auto is_still = [&](int row) {
+    return is_zero(x + std::ptrdiff_t{row} * step, std::ptrdiff_t{rows_from(row) - 1} * step + weight_count);
+  };
+  for (int row = 0; row < count;) {
+    int end = row;
+    while (end < count && !is_still(end)) end += rows_from(end);
+    if (end > row)
+      filter_all(x + std::ptrdiff_t{row} * step, step, weights, weight_count, end - row, scratch, out + row);
+    row = end;
+    for (; row < count && row < end + kLooked; ++row) out[row] = 0.0;
   }
-  int first = 0;
-  for (; first + kFilterPacks * kLanes <= count; first += kFilterPacks * kLanes)
-    filter_rows<kFilterPacks>(scratch + first, length, step, weights, weight_count, out + first);
-  for (; first < count; first += kLanes)
-    filter_rows<1>(scratch + first, length, step, weights, weight_count, out + first);
 }
 
 }  // namespace

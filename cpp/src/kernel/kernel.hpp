@@ -90,10 +90,11 @@ struct Tile {
   double* tip;           ///< out [12][kTilePoses]: p, then R column by column; null: not wanted
 };
 
-/// Numbers that a filter needs beside its rows: every step-th one in a piece, so that neighbours in lanes are
-/// neighbours in memory.
+/// Numbers that a filter needs beside its rows, which stand there again, lane by lane.
 constexpr std::size_t filter_scratch(int step, int weight_count, int count) {
-  return static_cast<std::size_t>(step) * static_cast<std::size_t>(count + weight_count / step + 1);
+  constexpr std::size_t kMostLanes = 8;  // and as many numbers until a pack may begin
+  return static_cast<std::size_t>(count) * static_cast<std::size_t>(step) +
+         kMostLanes * (static_cast<std::size_t>(weight_count) + 1);
 }
 
 /// Rows for gram_add_rows have a multiple of so many numbers.

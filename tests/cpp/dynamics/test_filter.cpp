@@ -77,7 +77,9 @@ TEST_CASE("where a column is zero for long nothing is summed, and beside it all 
 }
 
 TEST_CASE("every copy of the kernel filters as the sum says, and rows do not depend on each other, to the bit") {
-  const Eigen::VectorXd x = Eigen::VectorXd::Random(700), weights = Eigen::VectorXd::Random(51);
+  Eigen::VectorXd x = Eigen::VectorXd::Random(700);
+  x.segment(60, 80).setZero();  // all that some rows see
+  const Eigen::VectorXd weights = Eigen::VectorXd::Random(51);
   for (const char* name : {"scalar", "sse2", "avx2", "avx512"}) {
     const truing::kernel::Functions* kernel = truing::kernel::functions(name);
     if (!kernel) continue;
