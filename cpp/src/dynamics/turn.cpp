@@ -5,19 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/laws.hpp"
+
 namespace truing::dynamics {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// log(2 cosh(x)).
-double log_cosh(double x) {
-  constexpr double kStraight = 20.0;  // from here on the second part is less than half of the first one's last bit
-  const double size = std::abs(x);
-  return size > kStraight ? size : size + std::log1p(std::exp(-2.0 * size));
-}
 
 /// A speed, and the integral of tanh(v / width) up to it, over the width.
 struct Reached {
@@ -33,12 +28,15 @@ double mean_tanh(const Reached& a, const Reached& b, double width) {
 }  // namespace
 
 VectorXd direction_by_speed(const Eigen::Ref<const VectorXd>& qd, double width) {
-  VectorXd out(qd.size());
-  if (qd.size() == 0) return out;
-  const auto reached = [width](double v) { return Reached{v, log_cosh(v / width)}; };
-  Reached before = reached(qd[0]);  // half-way from the row before
-  for (Index i = 0; i < qd.size(); ++i) {
-    const Reached at = reached(qd[i]), after = reached(0.5 * (qd[i] + qd[std::min(i + 1, qd.size() - 1)]));
+  const Index rows = qd.size();
+  VectorXd out(rows);
+  if (rows == 0) return out;
+  VectorXd between(rows);  // half-way to the next row
+  between << 0.5 * (qd.head(rows - 1) + qd.tail(rows - 1)), qd[rows - 1];
+  const Eigen::ArrayXd there = logs_of_two_cosh(qd / width), on_the_way = logs_of_two_cosh(between / width);
+  Reached before{qd[0], there[0]};
+  for (Index i = 0; i < rows; ++i) {
+    const Reached at{qd[i], there[i]}, after{between[i], on_the_way[i]};
     out[i] = 0.5 * (mean_tanh(before, at, width) + mean_tanh(at, after, width));
     before = after;
   }

@@ -9,6 +9,7 @@
 
 #include "drive.hpp"
 #include "kernel.hpp"
+#include "laws.hpp"
 #include "rigid.hpp"
 
 namespace truing::kernel {
@@ -17,22 +18,26 @@ namespace scalar {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
 extern const DriveFunctions drive_table;
+extern const LawFunctions law_table;
 }  // namespace scalar
 namespace sse2 {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
 extern const DriveFunctions drive_table;
+extern const LawFunctions law_table;
 }  // namespace sse2
 #if TRUING_X86
 namespace avx2 {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
 extern const DriveFunctions drive_table;
+extern const LawFunctions law_table;
 }  // namespace avx2
 namespace avx512 {
 extern const Functions table;
 extern const RigidFunctions rigid_table;
 extern const DriveFunctions drive_table;
+extern const LawFunctions law_table;
 }  // namespace avx512
 #endif
 
@@ -98,6 +103,24 @@ const DriveFunctions* drive_functions(const char* name) {
 
 const DriveFunctions& drive_functions() {
   static const DriveFunctions& chosen = *drive_functions(functions().name);
+  return chosen;
+}
+
+const LawFunctions* law_functions(const char* name) {
+  const Functions* found = functions(name);
+  if (!found) return nullptr;
+  for (const LawFunctions* copy : {&scalar::law_table, &sse2::law_table,
+#if TRUING_X86
+                                   &avx2::law_table, &avx512::law_table
+#endif
+       }) {
+    if (std::strcmp(copy->name, found->name) == 0) return copy;
+  }
+  return nullptr;
+}
+
+const LawFunctions& law_functions() {
+  static const LawFunctions& chosen = *law_functions(functions().name);
   return chosen;
 }
 

@@ -80,6 +80,7 @@ ONLY_IN = {
     "iostream": set[str](),  # the library prints nothing
 }
 INCLUDE_LINE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+OF_KERNEL = {"kernel.hpp", "rigid.hpp", "drive.hpp", "lanes.hpp", "laws.hpp"}
 STANDARD = re.compile(r"[a-z_]+")  # <vector>; but not <ceres/ceres.h>
 
 
@@ -122,7 +123,7 @@ def test_a_room_includes_only_those_below_it(file: str) -> None:
         f"{file} is in no room: give its folder a line, here and in docs/method/architecture.md"
     )
     for bracket, name in includes(sources()[file]):
-        if name in {"rooms.hpp", "kernel.hpp", "rigid.hpp", "drive.hpp", "lanes.hpp"}:
+        if name == "rooms.hpp" or name in OF_KERNEL:
             continue
         if name in public_headers():
             assert name.startswith(PUBLIC_OF[room] or ("-",)), (
@@ -166,7 +167,7 @@ def test_the_compiler_sees_the_same_rooms_as_this_table() -> None:
 @pytest.mark.parametrize("file", sorted(file for file in sources() if file.startswith("kernel/")))
 def test_the_kernel_knows_nothing_of_what_uses_it(file: str) -> None:
     for _, name in includes(sources()[file]):
-        known = name in {"kernel.hpp", "rigid.hpp", "drive.hpp", "lanes.hpp"} or STANDARD.fullmatch(name)
+        known = name in OF_KERNEL or STANDARD.fullmatch(name)
         assert known, f"{file} includes {name}: raw pointers and the standard library are all there is here"
 
 

@@ -127,7 +127,11 @@ TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, d
   term.prior = prior;
   term.needs_torque = needs_torque;
   term.needs_rigid = false;
-  term.basis = [column = std::move(column)](const Motion& m) -> Eigen::MatrixXd { return column(m).matrix(); };
+  term.basis = [column = std::move(column)](const Motion& m) {
+    Eigen::MatrixXd out(m.rows(), 1);
+    column(m, Phi(out.data(), m.rows()));
+    return out;
+  };
   return term;
 }
 

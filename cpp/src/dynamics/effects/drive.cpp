@@ -11,27 +11,27 @@
 namespace truing::dynamics {
 namespace {
 
-using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
 std::vector<TorqueForm> current_offset(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{undirected(term_at(joint, parameter_name("current_offset", robot, joint), torque_unit(robot, joint),
                               0.3 * std::max(range.torque[static_cast<Index>(joint)], 1e-3),
-                              [](const Motion& m) -> ArrayXd { return ArrayXd::Ones(m.rows()); }))}};
+                              [](const Motion&, Phi phi) { phi = 1.0; }))}};
 }
 
 std::vector<TorqueForm> motor_constant(const Robot& robot, std::size_t joint, const MotionRange&) {
   // A constant that is further off is another unit, or was never stated.
-  return {{within(term_at(
-                      joint, parameter_name("motor_constant", robot, joint), "-", 0.2,
-                      [joint](const Motion& m) -> ArrayXd { return m.torque.col(static_cast<Index>(joint)); }, true),
-                  -0.5, 1.0)}};
+  return {
+      {within(term_at(
+                  joint, parameter_name("motor_constant", robot, joint), "-", 0.2,
+                  [joint](const Motion& m, Phi phi) { phi = m.torque.col(static_cast<Index>(joint)).array(); }, true),
+              -0.5, 1.0)}};
 }
 
 std::vector<TorqueForm> torque_lag(const Robot& robot, std::size_t joint, const MotionRange&) {
-  const auto column = [joint](const Motion& m) -> ArrayXd {
-    return -rate_of(m.torque.col(static_cast<Index>(joint)), m.step);
+  const auto column = [joint](const Motion& m, Phi phi) {
+    phi = -rate_of(m.torque.col(static_cast<Index>(joint)), m.step).array();
   };
   return {{within(term_at(joint, parameter_name("torque_lag", robot, joint), "s", 0.01, column, true), 0.0)}};
 }

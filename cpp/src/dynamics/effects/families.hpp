@@ -39,8 +39,9 @@ double torque_prior(const MotionRange& range, std::size_t joint);
 /// How the dry friction that the robot carries turns round, by joint.
 std::vector<FrictionTurn> turns_of(const Robot& robot);
 
-/// One column of one joint's torque.
-using Column = std::function<Eigen::ArrayXd(const Motion&)>;
+/// One column of one joint's torque, phi, which the law writes where it stands.
+using Phi = Eigen::Map<Eigen::ArrayXd>;
+using Column = std::function<void(const Motion&, Phi phi)>;
 TorqueTerm term_at(std::size_t joint, std::string parameter, std::string unit, double prior, Column column,
                    bool needs_torque = false);
 

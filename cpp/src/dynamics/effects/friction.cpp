@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "dynamics/effects/families.hpp"
+#include "dynamics/laws.hpp"
 #include "dynamics/prepare.hpp"
 #include "dynamics/turn.hpp"
 
 namespace truing::dynamics {
 namespace {
 
-using Eigen::ArrayXd;
 using Eigen::Index;
 
 double per_speed(const MotionRange& range, std::size_t joint) {
@@ -32,7 +32,7 @@ const char* const kTurnFade = "turn_fade";
 /// The direction is that of the motion, which knows how friction turns; the term's constants say it.
 TorqueForm coulomb_turning(const Robot& robot, std::size_t joint, const FrictionTurn& turn, double prior) {
   TorqueTerm term = term_at(joint, parameter_name(kCoulomb, robot, joint), torque_unit(robot, joint), prior,
-                            [joint](const Motion& m) { return direction(m, joint); });
+                            [joint](const Motion& m, Phi phi) { phi = direction(m, joint); });
   const bool by_travel = turn.travel > 0.0;
   term.constants[parameter_name(kCoulomb, robot, joint, by_travel ? kTurnTravel : kTurnSpeed)] =
       by_travel ? turn.travel : turn.speed;
@@ -51,7 +51,7 @@ TorqueForm coulomb_with(const Robot& robot, std::size_t joint, const std::map<st
 std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{undirected(term_at(joint, parameter_name("viscous", robot, joint),
                               torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
-                              [joint](const Motion& m) { return speed(m, joint); }))}};
+                              [joint](const Motion& m, Phi phi) { phi = speed(m, joint); }))}};
 }
 
 // --- laws of the speed beside Coulomb's and the linear one
@@ -60,7 +60,7 @@ const char* const kLaw = "viscous_law";
 
 TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, double prior) {
   TorqueTerm term = term_at(joint, parameter_name(kLaw, robot, joint, "saturating"), torque_unit(robot, joint), prior,
-                            [joint, v0](const Motion& m) -> ArrayXd { return (speed(m, joint) / v0).tanh(); });
+                            [joint, v0](const Motion& m, Phi phi) { phi = tangents(speed(m, joint) / v0); });
   term.constants[parameter_name(kLaw, robot, joint, "v0")] = v0;
   return {within(undirected(std::move(term)), 0.0)};  // friction that falls is Stribeck's
 }
@@ -73,15 +73,15 @@ std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const
   out.push_back(
       {undirected(term_at(joint, parameter_name(kLaw, robot, joint, "quadratic"), unit + " s^2/" + angle + "^2",
                           torque / (fastest * fastest),
-                          [joint](const Motion& m) -> ArrayXd { return speed(m, joint) * speed(m, joint).abs(); }))});
+                          [joint](const Motion& m, Phi phi) { phi = speed(m, joint) * speed(m, joint).abs(); }))});
   out.push_back({undirected(term_at(joint, parameter_name(kLaw, robot, joint, "cubic"), unit + " s^3/" + angle + "^3",
                                     torque / std::pow(fastest, 3.0),
-                                    [joint](const Motion& m) -> ArrayXd { return speed(m, joint).cube(); }))});
-  out.push_back({within(
-      term_at(joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5",
-              torque / std::sqrt(fastest),
-              [joint](const Motion& m) -> ArrayXd { return direction(m, joint) * speed(m, joint).abs().sqrt(); }),
-      0.0)});
+                                    [joint](const Motion& m, Phi phi) { phi = speed(m, joint).cube(); }))});
+  out.push_back(
+      {within(term_at(joint, parameter_name(kLaw, robot, joint, "root"), unit + " (s/" + angle + ")^0.5",
+                      torque / std::sqrt(fastest),
+                      [joint](const Motion& m, Phi phi) { phi = direction(m, joint) * speed(m, joint).abs().sqrt(); }),
+              0.0)});
   for (const double part : {0.05, 0.15, 0.4, 1.0}) out.push_back(saturating_with(robot, joint, part * fastest, torque));
   return out;
 }
@@ -99,8 +99,8 @@ double steepest(double size, double vs) { return size * std::sqrt(2.0) * std::ex
 // may look the same.
 TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double prior) {
   TorqueTerm term = term_at(joint, parameter_name("stribeck", robot, joint), torque_unit(robot, joint), prior,
-                            [joint, vs](const Motion& m) -> ArrayXd {
-                              return direction(m, joint) * (-(speed(m, joint) / vs).square()).exp();
+                            [joint, vs](const Motion& m, Phi phi) {
+                              phi = direction(m, joint) * exponentials(-(speed(m, joint) / vs).square());
                             });
   term.constants[parameter_name("stribeck", robot, joint, "vs")] = vs;
   term.may_as_well_be = [vs, own = term.parameter, drag = parameter_name("viscous", robot, joint)](
@@ -132,7 +132,7 @@ TorqueForm stribeck_with(const Robot& robot, std::size_t joint, const std::map<s
 TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, double prior) {
   TorqueTerm term = term_at(
       joint, parameter_name("presliding", robot, joint), torque_unit(robot, joint), prior,
-      [joint, x0](const Motion& m) -> ArrayXd { return stop_operator(m.q.col(static_cast<Index>(joint)), x0); });
+      [joint, x0](const Motion& m, Phi phi) { phi = stop_operator(m.q.col(static_cast<Index>(joint)), x0).array(); });
   term.constants[parameter_name("presliding", robot, joint, "x0")] = x0;
   return {within(undirected(std::move(term)), 0.0)};
 }
@@ -156,13 +156,13 @@ TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map
 std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{undirected(term_at(joint, parameter_name("asymmetric_friction", robot, joint),
                               torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
-                              [joint](const Motion& m) -> ArrayXd { return speed(m, joint).abs(); }))}};
+                              [joint](const Motion& m, Phi phi) { phi = speed(m, joint).abs(); }))}};
 }
 
 // Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011).
 std::vector<TorqueForm> load_friction(const Robot& robot, std::size_t joint, const MotionRange&) {
-  const auto column = [joint](const Motion& m) -> ArrayXd {
-    return direction(m, joint) * m.torque.col(static_cast<Index>(joint)).array().abs();
+  const auto column = [joint](const Motion& m, Phi phi) {
+    phi = direction(m, joint) * m.torque.col(static_cast<Index>(joint)).array().abs();
   };
   return {{within(term_at(joint, parameter_name("load_friction", robot, joint), "-", 0.3, column, true), 0.0, 0.6)}};
 }
@@ -172,9 +172,9 @@ std::vector<TorqueForm> position_friction(const Robot& robot, std::size_t joint,
   const double prior = 0.3 * torque_prior(range, joint);
   const auto angle = [joint](const Motion& m) { return m.q.col(static_cast<Index>(joint)); };
   return {{term_at(joint, parameter_name("position_friction", robot, joint, "sin"), "Nm", prior,
-                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * sines(angle(m)); }),
+                   [=](const Motion& m, Phi phi) { phi = direction(m, joint) * sines(angle(m)); }),
            term_at(joint, parameter_name("position_friction", robot, joint, "cos"), "Nm", prior,
-                   [=](const Motion& m) -> ArrayXd { return direction(m, joint) * cosines(angle(m)); })}};
+                   [=](const Motion& m, Phi phi) { phi = direction(m, joint) * cosines(angle(m)); })}};
 }
 
 TorqueTraits traits(const char* plain, SimulatorPlace mujoco, SimulatorPlace urdf, EffectDocumentation documentation) {

@@ -13,7 +13,6 @@
 namespace truing::dynamics {
 namespace {
 
-using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -151,7 +150,7 @@ std::vector<TorqueForm> armature(const Robot& robot, std::size_t joint, const Mo
   const double prior = std::max(range.torque[at], 1e-3) / std::max(range.acceleration[at], 0.1);
   return {{within(
       undirected(term_at(joint, parameter_name("armature", robot, joint), is_revolute(robot, joint) ? "kg m^2" : "kg",
-                         prior, [at](const Motion& m) -> ArrayXd { return m.qdd.col(at); })),
+                         prior, [at](const Motion& m, Phi phi) { phi = m.qdd.col(at).array(); })),
       0.0)}};
 }
 

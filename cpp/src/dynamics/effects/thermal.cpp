@@ -27,18 +27,21 @@ std::string temperature_column(std::size_t joint, const MotionRange& range) {
   throw MissingColumn("needs the column " + own + " or temp_C with temperatures that differ");
 }
 
+/// What friction changes with.
+using Factor = std::function<ArrayXd(const Motion&)>;
+
 /// Friction that changes by more than the joint's whole torque while it is recorded stands for something else.
 TorqueForm friction_times(const char* effect, const Robot& robot, std::size_t joint, const MotionRange& range,
-                          double size, const std::string& per, const Column& factor) {
+                          double size, const std::string& per, const Factor& factor) {
   const auto at = static_cast<Index>(joint);
   const double torque = torque_prior(range, joint) / size, fastest = std::max(range.speed[at], kSpeedAtRest);
   const std::string unit = torque_unit(robot, joint);
   TorqueTerm coulomb =
       term_at(joint, parameter_name(effect, robot, joint, "coulomb"), unit + "/" + per, 0.3 * torque,
-              [at, factor](const Motion& m) -> ArrayXd { return m.direction.col(at).array() * factor(m); });
+              [at, factor](const Motion& m, Phi phi) { phi = m.direction.col(at).array() * factor(m); });
   TorqueTerm viscous = term_at(joint, parameter_name(effect, robot, joint, "viscous"),
                                unit + " s/(" + angle_unit(robot, joint) + " " + per + ")", 0.3 * torque / fastest,
-                               [at, factor](const Motion& m) -> ArrayXd { return m.qd.col(at).array() * factor(m); });
+                               [at, factor](const Motion& m, Phi phi) { phi = m.qd.col(at).array() * factor(m); });
   return {within(std::move(coulomb), -torque, torque), within(std::move(viscous), -torque / fastest, torque / fastest)};
 }
 

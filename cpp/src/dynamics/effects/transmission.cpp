@@ -14,7 +14,6 @@
 namespace truing::dynamics {
 namespace {
 
-using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -30,12 +29,13 @@ std::vector<TorqueForm> coupling(const Robot& robot, std::size_t joint, const Mo
     const double torque = 0.3 * torque_prior(range, joint);
     const std::string unit = torque_unit(robot, joint);
     out.push_back(
-        {term_at(joint, name + "coulomb", unit, torque, [other](const Motion& m) { return m.direction.col(other); }),
+        {term_at(joint, name + "coulomb", unit, torque,
+                 [other](const Motion& m, Phi phi) { phi = m.direction.col(other).array(); }),
          undirected(term_at(joint, name + "viscous", unit + " s/" + angle_unit(robot, k),
                             torque / std::max(range.speed[other], 0.01),
-                            [other](const Motion& m) -> ArrayXd { return m.qd.col(other); })),
+                            [other](const Motion& m, Phi phi) { phi = m.qd.col(other).array(); })),
          undirected(term_at(joint, name + "inertia", "kg m^2", torque / std::max(range.acceleration[other], 0.1),
-                            [other](const Motion& m) -> ArrayXd { return m.qdd.col(other); }))});
+                            [other](const Motion& m, Phi phi) { phi = m.qdd.col(other).array(); }))});
   }
   if (out.empty()) throw Unsuited("there is no other joint");
   return out;
@@ -54,9 +54,9 @@ std::vector<TorqueForm> ripple(const Robot& robot, std::size_t joint, const Moti
     const std::string name = parameter_name("ripple", robot, joint);
     const double prior = 0.2 * torque_prior(range, joint);
     out.push_back({term_at(joint, name + ".sin" + std::to_string(k), "Nm", prior,
-                           [at, k](const Motion& m) -> ArrayXd { return sines(k * m.q.col(at)); }),
+                           [at, k](const Motion& m, Phi phi) { phi = sines(k * m.q.col(at)); }),
                    term_at(joint, name + ".cos" + std::to_string(k), "Nm", prior,
-                           [at, k](const Motion& m) -> ArrayXd { return cosines(k * m.q.col(at)); })});
+                           [at, k](const Motion& m, Phi phi) { phi = cosines(k * m.q.col(at)); })});
     for (TorqueTerm& term : out.back()) {
       term.only_alternative = !seen;
       term.needs_direction = false;
@@ -70,7 +70,7 @@ std::vector<TorqueForm> spring(const Robot& robot, std::size_t joint, const Moti
   const double travel = std::max(range.upper[at] - range.lower[at], 1e-3);
   return {{undirected(
       term_at(joint, parameter_name("spring", robot, joint), torque_unit(robot, joint) + "/" + angle_unit(robot, joint),
-              torque_prior(range, joint) / travel, [at](const Motion& m) -> ArrayXd { return m.q.col(at); }))}};
+              torque_prior(range, joint) / travel, [at](const Motion& m, Phi phi) { phi = m.q.col(at).array(); }))}};
 }
 
 // --- the link is not where the motor is
