@@ -90,11 +90,11 @@ Eigen::MatrixXd filtered(const Eigen::MatrixXd& x, const Eigen::VectorXd& weight
 
 Eigen::MatrixXd rate_of(const Eigen::MatrixXd& x, double step) {
   const Eigen::Index n = x.rows();
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, x.cols());
-  if (n < 2) return out;
+  if (n < 2) return Eigen::MatrixXd::Zero(n, x.cols());
+  Eigen::MatrixXd out(n, x.cols());
   out.row(0) = (x.row(1) - x.row(0)) / step;
   out.row(n - 1) = (x.row(n - 1) - x.row(n - 2)) / step;
-  if (n > 2) out.middleRows(1, n - 2) = (x.bottomRows(n - 2) - x.topRows(n - 2)) / (2.0 * step);
+  if (n > 2) out.middleRows(1, n - 2) = (0.5 / step) * (x.bottomRows(n - 2) - x.topRows(n - 2));
   return out;
 }
 

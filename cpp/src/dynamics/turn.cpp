@@ -64,8 +64,9 @@ VectorXd stop_operator(const Eigen::Ref<const VectorXd>& q, double x0, double ke
   const double per_row = 0.5 / x0;
   for (Index i = 1; i < q.size(); ++i) {
     const double move = per_row * (q[i] - q[i - 1]);
-    out[i - 1] += 0.5 * half_row(move);
-    out[i] += 0.5 * half_row(move);
+    const bool stays = kept == 1.0 && z == std::copysign(1.0, move);  // at its bound, as in most rows
+    out[i - 1] += 0.5 * (stays ? z : half_row(move));
+    out[i] += 0.5 * (stays ? z : half_row(move));
   }
   if (q.size() > 1) {  // whose rows have only half of their time
     out[0] *= 2.0;
