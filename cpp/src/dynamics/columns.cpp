@@ -84,8 +84,8 @@ struct SumOrder {
 /// Normal equations of rows of a table, the measured value its last column. Known products are nought.
 class TableSum {
  public:
-  Gram of(const MatrixXd& table, const std::vector<Index>& rows, const SumOrder& order) {
-    const auto columns = static_cast<int>(table.cols());
+  Gram of(const std::vector<double*>& table, const std::vector<Index>& rows, const SumOrder& order) {
+    const auto columns = static_cast<int>(table.size());
     sums_.resize(std::max(sums_.size(), kernel::functions().gram_size(columns)), 0.0);
     places_.resize(static_cast<std::size_t>(columns));
     const std::vector<Index> rest = add_long_runs(table, rows, order);
@@ -106,13 +106,14 @@ class TableSum {
   }
 
   /// Many rows that follow each other stay where they are. Returns the others.
-  std::vector<Index> add_long_runs(const MatrixXd& table, const std::vector<Index>& rows, const SumOrder& order) {
+  std::vector<Index> add_long_runs(const std::vector<double*>& table, const std::vector<Index>& rows,
+                                   const SumOrder& order) {
     std::vector<Index> rest;
     find_runs(rows.data(), static_cast<Index>(rows.size()));
     for (const auto& [first, length] : runs_) {
       const Index whole = length < kLong ? 0 : length - length % kernel::kSampleMultiple;
       for (Index done = 0; done < whole; done += kTogether) {
-        for (std::size_t c = 0; c < places_.size(); ++c) places_[c] = table.col(order.columns[c]).data() + first + done;
+        for (std::size_t c = 0; c < places_.size(); ++c) places_[c] = column(table, order, c) + first + done;
         add(order, std::min(kTogether, whole - done));
       }
       for (Index i = whole; i < length; ++i) rest.push_back(first + i);
@@ -120,12 +121,16 @@ class TableSum {
     return rest;
   }
 
+  static const double* column(const std::vector<double*>& table, const SumOrder& order, std::size_t c) {
+    return table[static_cast<std::size_t>(order.columns[c])];
+  }
+
   /// Rows that follow each other are copied together.
-  void copy(const MatrixXd& table, const SumOrder& order, const Index* rows, Index count) {
-    rows_.resize(kTogether, std::max(rows_.cols(), table.cols()));
+  void copy(const std::vector<double*>& table, const SumOrder& order, const Index* rows, Index count) {
+    rows_.resize(kTogether, std::max(rows_.cols(), static_cast<Index>(table.size())));
     find_runs(rows, count);
     for (std::size_t c = 0; c < places_.size(); ++c) {
-      const double* const from = table.col(order.columns[c]).data();
+      const double* const from = column(table, order, c);
       double* to = rows_.col(static_cast<Index>(c)).data();
       places_[c] = to;
       for (const auto& [first, length] : runs_) to = std::copy_n(from + first, length, to);
@@ -206,16 +211,16 @@ std::vector<std::vector<Index>> rows_of(const Tile& tile, Index joint, const std
 TileGrams grams_of(DesignColumns::Tables* columns, const Tile& tile, const MatrixXd& predicted, const Folds& folds,
                    const std::vector<SumOrder>& orders, Rows which) {
   thread_local TableSum sum;  // its room is large, and clearing pages takes long
-  TileGrams out(columns->size(), std::vector<Gram>(static_cast<std::size_t>(folds.count)));
+  TileGrams out(columns->joints.size(), std::vector<Gram>(static_cast<std::size_t>(folds.count)));
   const std::vector<int> fold = folds_of(tile, folds);
-  for (std::size_t j = 0; j < columns->size(); ++j) {
+  for (std::size_t j = 0; j < columns->joints.size(); ++j) {
     const auto joint = static_cast<Index>(j);
-    MatrixXd& table = (*columns)[j];
+    DesignColumns::Table& table = columns->joints[j];
     if (table.rows() == 0) continue;
-    table.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
+    table.own.rightCols(1) = tile.measured.col(joint) - predicted.col(joint);
     const std::vector<std::vector<Index>> rows = rows_of(tile, joint, fold, folds.count, which);
     for (std::size_t f = 0; f < rows.size(); ++f) {
-      if (!rows[f].empty()) out[j][f] = sum.of(table, rows[f], orders[j]);
+      if (!rows[f].empty()) out[j][f] = sum.of(table.columns, rows[f], orders[j]);
     }
   }
   return out;
@@ -246,16 +251,34 @@ DesignColumns::DesignColumns(const Tiles& tiles, const TorqueDesign& design, std
   }
 }
 
-const std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, std::vector<MatrixXd>* made) const {
-  std::vector<MatrixXd>& place = tiles_.are_kept() ? tile->memory.links : *made;
+MatrixXd DesignColumns::Table::copied(Index more) const {
+  MatrixXd out(rows(), own.cols() - 1 + more);
+  for (Index c = 0; c + 1 < own.cols() && rows() > 0; ++c)
+    std::copy_n(columns[static_cast<std::size_t>(c)], rows(), out.col(c).data());
+  return out;
+}
+
+DesignColumns::Tables DesignColumns::empty_tables(const Tile& tile) const {
+  Tables out;
+  for (std::size_t j = 0; j < by_joint_.size(); ++j) {
+    const bool wanted = resting_ == Resting::made || tile.moving.col(static_cast<Index>(j)).any();
+    Table& table = out.joints.emplace_back();
+    table.own.resize(wanted ? tile.count : 0, static_cast<Index>(by_joint_[j].size()) + 1);
+    for (Index c = 0; c < table.own.cols(); ++c) table.columns.push_back(table.own.col(c).data());
+  }
+  return out;
+}
+
+std::vector<MatrixXd>& DesignColumns::links_of(Tile* tile, Tables* tables) const {
+  std::vector<MatrixXd>& place = tiles_.are_kept() ? tile->memory.links : tables->links;
   if (place.empty()) place = filtered_links(chain_, *tile);
   return place;
 }
 
 void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&, int)>& wanted, Tables* tables) const {
   const auto is_made = [&](const TorqueTerm& term, int column) {
-    return wanted(term, column) &&
-           std::any_of(term.joints.begin(), term.joints.end(), [&](std::size_t j) { return (*tables)[j].rows() > 0; });
+    return wanted(term, column) && std::any_of(term.joints.begin(), term.joints.end(),
+                                               [&](std::size_t j) { return tables->joints[j].rows() > 0; });
   };
   const auto any = [&](bool TorqueTerm::* needs) {
     return std::any_of(columns_.begin(), columns_.end(), [&](int c) {
@@ -268,31 +291,29 @@ void DesignColumns::fill(Tile* tile, const std::function<bool(const TorqueTerm&,
     fill_yielding(&tile->motion, any(&TorqueTerm::needs_inertia));
   else if (any(&TorqueTerm::needs_inertia))
     fill_inertia(&tile->motion);
-  std::vector<MatrixXd> made;
-  std::vector<Index> next(by_joint_.size(), 0);
-  std::map<std::string, std::pair<std::size_t, Index>> made_already;  // by TorqueTerm::column: joint and place
+  std::vector<std::size_t> next(by_joint_.size(), 0);
+  std::map<std::string, double*> made_already;  // by TorqueTerm::column
   for (const int c : columns_) {
     const TorqueTerm& term = design_.terms[static_cast<std::size_t>(c)];
     const bool of_link = term.link_parameter >= 0, now = is_made(term, c);
     const auto same = term.column.empty() ? made_already.end() : made_already.find(term.column);
-    const bool copied = same != made_already.end();
-    const MatrixXd values = of_link || copied || !now ? MatrixXd() : term.basis(tile->motion);
+    const bool is_there = of_link || same != made_already.end();
+    const MatrixXd values = is_there || !now ? MatrixXd() : term.basis(tile->motion);
     for (std::size_t k = 0; k < term.joints.size(); ++k) {
       const std::size_t j = term.joints[k];
-      const Index place = next[j]++;
-      if (!now || (*tables)[j].rows() == 0) continue;
-      auto out = (*tables)[j].col(place);
-      if (copied) {
-        out = (*tables)[same->second.first].col(same->second.second);
+      const std::size_t place = next[j]++;
+      Table& table = tables->joints[j];
+      if (!now || table.rows() == 0) continue;
+      double*& out = table.columns[place];
+      if (is_there) {
+        out = of_link ? links_of(tile, tables)[j].col(place_of(chain_, j, term.link_parameter)).data() : same->second;
         continue;
       }
-      if (!term.column.empty()) made_already.try_emplace(term.column, j, place);
-      if (of_link)
-        out = links_of(tile, &made)[j].col(place_of(chain_, j, term.link_parameter));
-      else if (values.rows() == 0)
-        out.setZero();
+      if (!term.column.empty()) made_already.try_emplace(term.column, out);
+      if (values.rows() == 0)
+        std::fill_n(out, table.rows(), 0.0);
       else
-        tile->own_rows(values.col(static_cast<Index>(k)).data(), out.data());
+        tile->own_rows(values.col(static_cast<Index>(k)).data(), out);
     }
   }
   clear_tables(&tile->motion);
@@ -302,12 +323,9 @@ void DesignColumns::use(Tile* tile, bool with_torque, const std::function<void(T
                         const std::vector<bool>& idle) const {
   Tables made;
   Tables& tables = kept_.empty() ? made : kept_[tile->number];
-  const bool fresh = tables.empty();
+  const bool fresh = tables.joints.empty();
   if (fresh) {
-    for (std::size_t j = 0; j < by_joint_.size(); ++j) {
-      const bool wanted = resting_ == Resting::made || tile->moving.col(static_cast<Index>(j)).any();
-      tables.emplace_back(wanted ? tile->count : 0, static_cast<Index>(by_joint_[j].size()) + 1);
-    }
+    tables = empty_tables(*tile);
     fill(tile, [](const TorqueTerm& term, int) { return !term.needs_torque; }, &tables);
   } else if (stale_[tile->number] != 0) {
     fill(tile, [](const TorqueTerm& term, int) { return looks_at_direction(term); }, &tables);
@@ -446,13 +464,19 @@ class ErrorsOf {
     set_direction(model_.turns(), tile);
     MatrixXd errors = tile->measured - kept_torque(model_, tile);
     columns_.use(tile, false, [&](const DesignColumns::Tables& tables) {
-      for (std::size_t j = 0; j < tables.size(); ++j) {
-        if (tables[j].rows() == 0) continue;
+      for (std::size_t j = 0; j < tables.joints.size(); ++j) {
+        const DesignColumns::Table& table = tables.joints[j];
+        if (table.rows() == 0) continue;
         const std::vector<int>& of = columns_.of_joint(j);
+        std::vector<const double*> places;
+        std::vector<double> factors;
         for (std::size_t c = 0; c < of.size(); ++c) {
-          if (values_[of[c]] != 0.0)
-            errors.col(static_cast<Index>(j)) -= values_[of[c]] * tables[j].col(static_cast<Index>(c));
+          if (values_[of[c]] == 0.0) continue;
+          places.push_back(table.columns[c]);
+          factors.push_back(-values_[of[c]]);
         }
+        kernel::functions().add_columns(places.data(), factors.data(), static_cast<int>(places.size()),
+                                        static_cast<int>(table.rows()), errors.col(static_cast<Index>(j)).data());
       }
     });
     return errors;

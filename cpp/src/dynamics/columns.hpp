@@ -18,9 +18,19 @@ enum class Resting { made, left_out };
 /// Tables of columns, tile by tile. Where tiles are kept, so are columns that need no torque.
 class DesignColumns {
  public:
-  /// By joint, shape=(count, columns of the joint + 1): filtered columns, and room for the torque. Without rows where
-  /// the joint rests and is left out.
-  using Tables = std::vector<Eigen::MatrixXd>;
+  /// Filtered columns of a joint, and room for the torque behind them. What several have stands in one place.
+  struct Table {
+    Eigen::MatrixXd own;           ///< shape=(rows, columns + 1); no rows where the joint rests and is left out
+    std::vector<double*> columns;  ///< where each stands: here, beside another joint's or with the links'
+
+    Eigen::Index rows() const { return own.rows(); }
+    /// As a matrix, with so many columns to be filled behind them.
+    Eigen::MatrixXd copied(Eigen::Index more) const;
+  };
+  struct Tables {
+    std::vector<Table> joints;
+    std::vector<Eigen::MatrixXd> links;  ///< where the tile does not keep them
+  };
 
   /// Both must outlive it.
   DesignColumns(const Tiles& tiles, const TorqueDesign& design, Resting resting = Resting::made);
@@ -46,8 +56,10 @@ class DesignColumns {
 
  private:
   void fill(Tile* tile, const std::function<bool(const TorqueTerm&, int column)>& wanted, Tables* tables) const;
+  /// Without their columns.
+  Tables empty_tables(const Tile& tile) const;
   /// The filtered columns of the links, kept with the tile where tiles are.
-  const std::vector<Eigen::MatrixXd>& links_of(Tile* tile, std::vector<Eigen::MatrixXd>* made) const;
+  std::vector<Eigen::MatrixXd>& links_of(Tile* tile, Tables* tables) const;
 
   const Tiles& tiles_;
   const TorqueDesign& design_;

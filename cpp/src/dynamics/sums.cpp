@@ -85,12 +85,11 @@ void add_to_block(const Eigen::MatrixXd& rows, TorqueBlock* block) {
 /// A tile's part of the blocks: of joint j in block b number b * joints + j.
 std::vector<TorqueBlock> blocks_of_tile(const DesignColumns::Tables& tables, const Tile& tile,
                                         const Eigen::MatrixXd& nominal, const Folds& folds) {
-  std::vector<TorqueBlock> out(tables.size() * static_cast<std::size_t>(folds.count));
+  std::vector<TorqueBlock> out(tables.joints.size() * static_cast<std::size_t>(folds.count));
   const Eigen::VectorXd time = tile.own_time();
-  for (std::size_t j = 0; j < tables.size(); ++j) {
+  for (std::size_t j = 0; j < tables.joints.size(); ++j) {
     const auto joint = static_cast<Eigen::Index>(j);
-    Eigen::MatrixXd all = tables[j];
-    all.conservativeResize(Eigen::NoChange, all.cols() + 1);
+    Eigen::MatrixXd all = tables.joints[j].copied(2);
     all.col(all.cols() - 2) = nominal.col(joint);
     all.col(all.cols() - 1) = tile.measured.col(joint) - nominal.col(joint);
     std::vector<std::vector<Eigen::Index>> rows(static_cast<std::size_t>(folds.count));
@@ -99,7 +98,7 @@ std::vector<TorqueBlock> blocks_of_tile(const DesignColumns::Tables& tables, con
       rows[static_cast<std::size_t>(folds.fold(0, time[i]))].push_back(i);
     }
     for (std::size_t b = 0; b < rows.size(); ++b) {
-      if (!rows[b].empty()) add_to_block(all(rows[b], Eigen::all), &out[b * tables.size() + j]);
+      if (!rows[b].empty()) add_to_block(all(rows[b], Eigen::all), &out[b * tables.joints.size() + j]);
     }
   }
   return out;

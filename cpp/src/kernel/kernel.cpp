@@ -454,6 +454,26 @@ void gram_add_rows(const double* rows, int columns, int count, bool first, doubl
   }
 }
 
+// So many columns at a time, each read from its begin to its end.
+template <int count>
+inline void add_some(const double* const* c, const double* by, int length, double* out) {
+  int i = 0;
+  for (; i + kLanes <= length; i += kLanes) {
+    Pack sum = load(out + i);
+    for (int k = 0; k < count; ++k) sum += by[k] * load(c[k] + i);
+    store(out + i, sum);
+  }
+  for (; i < length; ++i)
+    for (int k = 0; k < count; ++k) out[i] += by[k] * c[k][i];
+}
+
+void add_columns(const double* const* c, const double* by, int columns, int length, double* out) {
+  constexpr int kTogether = 8;
+  int k = 0;
+  for (; k + kTogether <= columns; k += kTogether) add_some<kTogether>(c + k, by + k, length, out);
+  for (; k < columns; ++k) add_some<1>(c + k, by + k, length, out);
+}
+
 // Squares of C row: so many lanes at a time stay in registers through the columns.
 void add_squared(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out) {
   constexpr int kPacks = 6;
@@ -580,6 +600,7 @@ const Functions table{TRUING_TEXT(TRUING_KERNEL_NAMESPACE),
                       gram_add_columns,
                       gram_reduce,
                       gram_add_rows,
+                      add_columns,
                       add_squared,
                       filter};
 

@@ -118,6 +118,8 @@ struct Functions {
   /// rows at a time: out[i * columns + j] += sum over rows of row[i] row[j], for j >= i at least. `first`: `out` is not
   /// read, and what stands there is gone.
   void (*gram_add_rows)(const double* rows, int columns, int count, bool first, double* out);
+  /// out[i] += sum over k of by[k] c[k][i], of `columns` columns of `length` numbers.
+  void (*add_columns)(const double* const* c, const double* by, int columns, int length, double* out);
   /// out[i] += (sum over k of row[k] c[k * stride + i])^2 for i below `length` (a multiple of kTilePoses).
   void (*add_squared)(const double* c, std::ptrdiff_t stride, const double* row, int columns, int length, double* out);
   /// out[i] = sum over k of weights[k] x[i * step + k], of `count` rows (a multiple of 8). `x` holds (count - 1) * step

@@ -208,13 +208,13 @@ TEST_CASE("columns of a joint that rests all through a tile may be left out: sum
   check_same(sum_grams(left_out, problem.nominal, more, problem.train),
              sum_grams(made, problem.nominal, more, problem.train));
   Eigen::Index rows_made = 0, rows_left = 0;
-  problem.tiles.for_each([](std::size_t r) { return r == 1; },
-                         [&](Tile& tile, std::size_t) {
-                           made.use(&tile, false, [&](DesignColumns::Tables& tables) { rows_made = tables[1].rows(); });
-                           left_out.use(&tile, false,
-                                        [&](DesignColumns::Tables& tables) { rows_left = tables[1].rows(); });
-                         },
-                         [](std::size_t) {});
+  problem.tiles.for_each(
+      [](std::size_t r) { return r == 1; },
+      [&](Tile& tile, std::size_t) {
+        made.use(&tile, false, [&](DesignColumns::Tables& tables) { rows_made = tables.joints[1].rows(); });
+        left_out.use(&tile, false, [&](DesignColumns::Tables& tables) { rows_left = tables.joints[1].rows(); });
+      },
+      [](std::size_t) {});
   CHECK(rows_made > 0);
   CHECK(rows_left == 0);
 }

@@ -390,6 +390,14 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
         CHECK(sums[i * padded + j] == doctest::Approx(sum).scale(1).epsilon(1e-14));
       }
     }
+    // Columns times numbers, of rows that no pack has whole; none beyond them is touched.
+    std::vector<double> together(length, 1.0);
+    f->add_columns(places.data(), expected.data(), columns, length - 3, together.data());
+    for (int i = 0; i < length; ++i) {
+      double sum = 1.0;
+      for (int k = 0; k < columns && i < length - 3; ++k) sum += expected[k] * some[k * length + i];
+      CHECK(together[i] == doctest::Approx(sum).scale(1).epsilon(1e-14));
+    }
     // Squares of a row of numbers times the columns.
     std::vector<double> squares(length, 1.0);
     f->add_squared(c.data(), length, expected.data(), columns, length, squares.data());
