@@ -259,10 +259,10 @@ MatrixXd DesignColumns::Table::copied(Index more) const {
 }
 
 DesignColumns::Tables DesignColumns::empty_tables(const Tile& tile) const {
-  Tables out;
+  Tables out{std::vector<Table>(by_joint_.size()), {}};
   for (std::size_t j = 0; j < by_joint_.size(); ++j) {
     const bool wanted = resting_ == Resting::made || tile.moving.col(static_cast<Index>(j)).any();
-    Table& table = out.joints.emplace_back();
+    Table& table = out.joints[j];
     table.own.resize(wanted ? tile.count : 0, static_cast<Index>(by_joint_[j].size()) + 1);
     for (Index c = 0; c < table.own.cols(); ++c) table.columns.push_back(table.own.col(c).data());
   }

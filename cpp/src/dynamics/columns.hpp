@@ -18,11 +18,15 @@ enum class Resting { made, left_out };
 /// Tables of columns, tile by tile. Where tiles are kept, so are columns that need no torque.
 class DesignColumns {
  public:
-  /// Filtered columns of a joint, and room for the torque behind them. What several have stands in one place.
+  /// Filtered columns of a joint, and room for the torque behind them. What several have stands in one place. Moved,
+  /// and never copied: the copy's columns would stand with the other one.
   struct Table {
     Eigen::MatrixXd own;           ///< shape=(rows, columns + 1); no rows where the joint rests and is left out
     std::vector<double*> columns;  ///< where each stands: here, beside another joint's or with the links'
 
+    Table() = default;
+    Table(Table&&) = default;
+    Table& operator=(Table&&) = default;
     Eigen::Index rows() const { return own.rows(); }
     /// As a matrix, with so many columns to be filled behind them.
     Eigen::MatrixXd copied(Eigen::Index more) const;

@@ -62,13 +62,14 @@ TEST_CASE("columns kept while friction turns otherwise are those made anew") {
   Problem problem(level_arm(), recordings, {});
   const TorqueDesign design = whole(problem);
   const DesignColumns kept(problem.tiles, design);
+  DesignColumns turned(problem.tiles, design);
   const auto sums = [&](const DesignColumns& columns, const FrictionTurn& turn) {
     const std::vector<FrictionTurn> turns(problem.robot.driven_count(), turn);
     return sum_grams(columns, problem.nominal, problem.nominal.turning(turns), problem.train);
   };
   const FrictionTurn slow{0.01, 0.0}, by_travel{0.01, 1e-4};
   sums(kept, slow);
-  DesignColumns turned = kept;
+  sums(turned, slow);
   turned.turned();
   const TorqueGrams again = sums(turned, by_travel), anew = sums(DesignColumns(problem.tiles, design), by_travel);
   const TorqueGrams before = sums(kept, slow);
