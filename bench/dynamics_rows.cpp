@@ -95,7 +95,7 @@ TileRows rows_of(const Problem& problem, const DesignColumns& columns, const Tor
   set_torque(seen, tile);  // what columns that need the torque see
   TileRows out;
   columns.use(tile, true, [&](const DesignColumns::Tables& tables) {
-    for (const MatrixXd& table : tables) out.columns.emplace_back(table.leftCols(table.cols() - 1));
+    for (const DesignColumns::Table& table : tables.joints) out.columns.push_back(table.copied(0));
   });
   const VectorXd time = tile->own_time();
   out.rows.resize(tile->count, 4 + 6 * joints);
