@@ -70,53 +70,43 @@ const Functions& functions() {
   return chosen;
 }
 
-const RigidFunctions* rigid_functions(const char* name) {
+namespace {
+
+/// Of these copies, the one that the named copy of kernel.cpp goes with.
+template <class Table>
+const Table* beside(const char* name, std::initializer_list<const Table*> copies) {
   const Functions* found = functions(name);
   if (!found) return nullptr;
-  for (const RigidFunctions* copy : {&scalar::rigid_table, &sse2::rigid_table,
-#if TRUING_X86
-                                     &avx2::rigid_table, &avx512::rigid_table
-#endif
-       }) {
+  for (const Table* copy : copies) {
     if (std::strcmp(copy->name, found->name) == 0) return copy;
   }
   return nullptr;
 }
+
+}  // namespace
+
+#if TRUING_X86
+#define TRUING_COPIES(table) {&scalar::table, &sse2::table, &avx2::table, &avx512::table}
+#else
+#define TRUING_COPIES(table) {&scalar::table, &sse2::table}
+#endif
+
+const RigidFunctions* rigid_functions(const char* name) {
+  return beside<RigidFunctions>(name, TRUING_COPIES(rigid_table));
+}
+const DriveFunctions* drive_functions(const char* name) {
+  return beside<DriveFunctions>(name, TRUING_COPIES(drive_table));
+}
+const LawFunctions* law_functions(const char* name) { return beside<LawFunctions>(name, TRUING_COPIES(law_table)); }
 
 const RigidFunctions& rigid_functions() {
   static const RigidFunctions& chosen = *rigid_functions(functions().name);
   return chosen;
 }
 
-const DriveFunctions* drive_functions(const char* name) {
-  const Functions* found = functions(name);
-  if (!found) return nullptr;
-  for (const DriveFunctions* copy : {&scalar::drive_table, &sse2::drive_table,
-#if TRUING_X86
-                                     &avx2::drive_table, &avx512::drive_table
-#endif
-       }) {
-    if (std::strcmp(copy->name, found->name) == 0) return copy;
-  }
-  return nullptr;
-}
-
 const DriveFunctions& drive_functions() {
   static const DriveFunctions& chosen = *drive_functions(functions().name);
   return chosen;
-}
-
-const LawFunctions* law_functions(const char* name) {
-  const Functions* found = functions(name);
-  if (!found) return nullptr;
-  for (const LawFunctions* copy : {&scalar::law_table, &sse2::law_table,
-#if TRUING_X86
-                                   &avx2::law_table, &avx512::law_table
-#endif
-       }) {
-    if (std::strcmp(copy->name, found->name) == 0) return copy;
-  }
-  return nullptr;
 }
 
 const LawFunctions& law_functions() {

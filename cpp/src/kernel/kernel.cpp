@@ -545,9 +545,9 @@ inline void filter_rows(const double* side_by_side, int step, const double* weig
   for (int k = 1; k < weight_count; ++k)
     for (int m = 0; m < rows; ++m) sum[m] += weights[k] * load(x[m] + std::ptrdiff_t{k} * kLanes);
 #ifdef TRUING_TRANSPOSES
-  if (rows == kLanes) {
+  if constexpr (rows == kLanes) {
     transpose(sum);
-    for (int l = 0; l < kLanes; ++l) store(out + l * part, sum[l % rows]);
+    for (int l = 0; l < kLanes; ++l) store(out + l * part, sum[l]);
     return;
   }
 #endif
