@@ -89,6 +89,7 @@ void check(const Robot& nominal, const MatrixXd& information, const VectorXd& gr
           "the gradient has " + std::to_string(gradient.size()) + " values, expected " + expected);
   require(near.size() == 0 || near.size() == n,
           "near has " + std::to_string(near.size()) + " values, expected none or " + expected);
+  require(near.allFinite(), "near has a value that is not finite");
   require(information.allFinite(), "the information has a value that is not finite");
   require(gradient.allFinite(), "the gradient has a value that is not finite");
   const double size = information.cwiseAbs().maxCoeff();
@@ -296,8 +297,9 @@ PhysicalInertias physical_inertias(const Robot& nominal, const MatrixXd& informa
     start.segment<10>(10 * static_cast<Index>(link)) = to;
   }
   const PhysicalObjective objective(start, information, gradient);
-  VectorXd x = near.size() > 0 ? objective.x_of(near) : objective.nearest_body();
+  VectorXd x = near.size() > 0 ? objective.x_of(near) : VectorXd();
   const bool is_near = near.size() > 0 && objective.is_body(x);
+  if (!is_near) x = objective.nearest_body();
   if (!objective.is_body(x)) x.setZero();  // so far from any body that its digits do not hold one
   // From where the border is far down to the prior's own weight.
   constexpr double kNats = 1e-9, kPath = 0.1;

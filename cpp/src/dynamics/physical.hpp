@@ -84,6 +84,7 @@ class PhysicalObjective {
   Line along(const Eigen::VectorXd& x, const Eigen::VectorXd& step, double weight) const;
 
   Eigen::VectorXd parameters(const Eigen::VectorXd& x) const;
+  /// Where `parameters` are these.
   Eigen::VectorXd x_of(const Eigen::VectorXd& parameters) const;
   double increase(const Eigen::VectorXd& x) const;  ///< of the sum of squares over its smallest
   /// Least squares, with eigenvalues that no body has raised to a little above nought.
@@ -107,10 +108,10 @@ class PhysicalObjective {
 /// cannot be caught in a minimum that is not the lowest: 5 to 20 steps where some body explains the data. Where none
 /// comes near, max_steps may end it, and `reason` says so; what is returned is a body even then. `information`: H,
 /// shape=(10 * joints, 10 * joints), Gram of the regressor over the noise's variance; `gradient`: g, shape=(10 *
-/// joints,), regressor times torque over it. Throws std::invalid_argument: another shape, values that are not finite, H
-/// not symmetric or with negative eigenvalues, options that are not positive. `near`: parameters of bodies that fit
-/// nearly the same data best; Newton's method begins there, at the path's end, and takes a quarter of the steps. Empty:
-/// not known.
+/// joints,), regressor times torque over it; `near`: shape=(10 * joints,), what was found of nearly the same data, from
+/// which it takes fewer steps, at the path's end; what no body has is not used; empty: nothing was. Throws
+/// std::invalid_argument: another shape, values that are not finite, H not symmetric or with negative eigenvalues,
+/// options that are not positive.
 PhysicalInertias physical_inertias(const Robot& nominal, const Eigen::MatrixXd& information,
                                    const Eigen::VectorXd& gradient, const PhysicalOptions& options = {},
                                    const Eigen::VectorXd& near = {});

@@ -374,6 +374,7 @@ Fit with_bodies(const Robot& nominal, const TorqueDesign& design, const Sums& su
   gradient(part.parameter) += g;
   VectorXd start;
   if (near) {
+    if (near->columns != fit.columns) throw std::logic_error("the fit that is near has other columns");
     start = before;
     start(part.parameter) += near->values(part.inertial);
   }

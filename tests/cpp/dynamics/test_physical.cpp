@@ -294,6 +294,8 @@ TEST_CASE("what cannot be used is refused in words") {
   refused(H, VectorXd::Zero(49), "49 values");
   CHECK_THROWS_WITH_AS(physical_inertias(robot, H, g, {}, VectorXd::Ones(49)), doctest::Contains("near has 49 values"),
                        std::invalid_argument);
+  CHECK_THROWS_WITH_AS(physical_inertias(robot, H, g, {}, VectorXd::Constant(50, std::nan(""))),
+                       doctest::Contains("near has a value that is not finite"), std::invalid_argument);
   MatrixXd other = H;
   other(3, 4) = std::nan("");
   refused(other, g, "not finite");
