@@ -34,7 +34,8 @@ run_ctest() {
 }
 
 build_tests() {
-  configure "$release" -DTRUING_BUILD_TESTS=ON -DTRUING_WERROR=ON -DTRUING_UNITY="$unity" -DCMAKE_BUILD_TYPE=Release
+  configure "$release" -DTRUING_BUILD_TESTS=ON -DTRUING_BUILD_BENCHMARKS=ON -DTRUING_WERROR=ON -DTRUING_UNITY="$unity" \
+    -DCMAKE_BUILD_TYPE=Release
   cmake --build "$release"
 }
 
