@@ -549,7 +549,7 @@ std::string causes_of(const std::vector<FoundTorqueEffect>& effects, std::size_t
 /// What stands beside what was named, in words.
 std::string words_of_usual(const Problem& problem, const Account& account) {
   if (problem.fitted_before) return "the robot's model";
-  if (account.inertias_given) return "the file's inertias with friction and an offset";
+  if (account.inertias_given) return "the file's model with friction and an offset";
   return "standard practice (inertias, Coulomb and viscous friction, an offset)";
 }
 

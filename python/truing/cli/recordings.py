@@ -193,7 +193,7 @@ def require_torques(recordings: Sequence[Recording]) -> None:
             continue
         raise InputError(
             f"{recording.name}: there is neither a torque (tau1_Nm …) nor a current (i1_A …): record one of"
-            " them, or take `truing dynamics diagnose`, which asks for no more than commands (u1_rad …)"
+            " them, or commands (u1_rad …), which are enough for `truing dynamics diagnose`"
         )
 
 
