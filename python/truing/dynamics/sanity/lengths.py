@@ -4,7 +4,8 @@
 
 Torques are linear in masses and frictions once the distances between joints are known. So distances are
 fitted by variable projection (Golub and Pereyra, SIAM Journal on Numerical Analysis 10, 1973): of each set of
-distances least squares finds the rest.
+distances least squares finds the rest, with Kaufman's slopes (BIT 15, 1975), which ask for no least squares
+of their own.
 """
 
 from __future__ import annotations
@@ -111,19 +112,39 @@ def _columns(robot: _core.Robot, rows: Rows, scale: Floats) -> Floats:
     return np.concatenate([links, own.reshape(n, joints, 4 * joints)], axis=2)
 
 
-def _left(columns: Floats, rows: Rows, sigma: Floats) -> Floats:
-    """What least squares by all columns leaves of the torques, each joint's in units of its own sigma.
-    shape=(measured torques,)
+def _weighed(columns: Floats, rows: Rows, sigma: Floats) -> Floats:
+    """Columns of the measured torques, each joint's in units of its own sigma.
+    shape=(measured torques, columns)
     """
-    measured = ~np.isnan(rows.torque)
-    columns = (columns / sigma[:, None])[measured]
-    torque = (rows.torque / sigma)[measured]
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0.0] / size[size > 0.0]
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    seen = values > RANK * values[-1]
-    basis = columns @ (vectors[:, seen] / np.sqrt(values[seen]))
-    return np.asarray(torque - basis @ (basis.T @ torque))
+    return np.asarray((columns / sigma[:, None])[~np.isnan(rows.torque)])
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """The torques, each joint's in units of its own sigma, without what columns can make of them."""
+
+    left: Floats  # shape=(measured torques,)
+    values: Floats  # of the columns, which leave this
+    basis: Floats  # orthonormal, of the space of the columns
+
+    def beyond(self, torque: Floats) -> Floats:
+        """What no column makes of such torques."""
+        return np.asarray(torque - self.basis @ (self.basis.T @ torque))
+
+
+def _projected(weighed: Floats, rows: Rows, sigma: Floats) -> _Projection:
+    torque = (rows.torque / sigma)[~np.isnan(rows.torque)]
+    size = np.linalg.norm(weighed, axis=0)
+    there = size > 0.0
+    columns = weighed[:, there] / size[there]
+    eigenvalues, vectors = np.linalg.eigh(columns.T @ columns)
+    seen = eigenvalues > RANK * eigenvalues[-1]
+    to_basis = vectors[:, seen] / np.sqrt(eigenvalues[seen])
+    basis = columns @ to_basis
+    along = basis.T @ torque
+    values = np.zeros(len(size))
+    values[there] = to_basis @ along / size[there]
+    return _Projection(np.asarray(torque - basis @ along), values, basis)
 
 
 def _noise(robot: _core.Robot, rows: Rows) -> Floats:
@@ -137,7 +158,8 @@ def _noise(robot: _core.Robot, rows: Rows) -> Floats:
     )
     usual = np.where(usual > 0.0, usual, 1.0)
     left = np.zeros(rows.torque.shape)
-    left[measured] = _left(_columns(robot, rows, np.ones(len(usual))), rows, usual)
+    columns = _columns(robot, rows, np.ones(len(usual)))
+    left[measured] = _projected(_weighed(columns, rows, usual), rows, usual).left
     rms = np.sqrt((left**2).sum(axis=0) / np.maximum(1, measured.sum(axis=0)))
     return np.asarray(usual * np.maximum(rms, 1e-3))
 
@@ -151,26 +173,30 @@ def _fitted(robot: _core.Robot, rows: Rows, distances: Sequence[_Distance]) -> _
     prior = np.abs(file) * np.repeat([WITHIN, GAIN_WITHIN], [few, joints])
     sigma = _noise(robot, rows)
 
-    def cost(value: Floats) -> tuple[Floats, float]:
-        columns = _columns(_with(robot, distances, value[:few]), rows, value[few:])
-        left = _left(columns, rows, sigma)
-        return left, float(left @ left + np.sum(((value - file) / prior) ** 2))
+    def columns(value: Floats) -> Floats:
+        return _weighed(_columns(_with(robot, distances, value[:few]), rows, value[few:]), rows, sigma)
+
+    def at(value: Floats) -> tuple[_Projection, float]:
+        projection = _projected(columns(value), rows, sigma)
+        left = projection.left
+        return projection, float(left @ left + np.sum(((value - file) / prior) ** 2))
 
     value = file
-    left, now = cost(value)
+    here, now = at(value)
     for _ in range(TURNS):
-        slopes = [(cost(value + STEP * axis)[0] - left) / STEP for axis in np.eye(len(file))]
-        jacobian = np.column_stack(slopes)
+        made = columns(value) @ here.values
+        moved = [(columns(value + STEP * axis) @ here.values - made) / STEP for axis in np.eye(len(file))]
+        jacobian = -here.beyond(np.column_stack(moved))
         normal = jacobian.T @ jacobian + np.diag(prior**-2.0)
-        step = np.linalg.solve(normal, -jacobian.T @ left - (value - file) / prior**2)
-        other, then = cost(value + step)
+        step = np.linalg.solve(normal, -jacobian.T @ here.left - (value - file) / prior**2)
+        other, then = at(value + step)
         while then > now and np.abs(step).max() > STEP:
             step *= 0.5
-            other, then = cost(value + step)
+            other, then = at(value + step)
         if then > now:
             break
         settled = now - then < SETTLED * now
-        value, left, now = value + step, other, then
+        value, here, now = value + step, other, then
         if settled:
             break
     sigmas = np.sqrt(np.diag(np.linalg.inv(normal)))
