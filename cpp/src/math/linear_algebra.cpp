@@ -19,11 +19,6 @@ Matrix<N> inverse_symmetric(const Matrix<N>& A) {
   return solve_symmetric<N, N>(A, Matrix<N>::Identity(A.rows(), A.cols()));
 }
 
-template <int N, int M>
-Matrix<N, M> solve_definite(const Matrix<N>& A, const Matrix<N, M>& b) {
-  return A.llt().solve(b);
-}
-
 template <int N>
 Vector<N> solve_square(const Matrix<N>& A, const Vector<N>& b) {
   return A.partialPivLu().solve(b);
@@ -55,11 +50,6 @@ template Matrix<X, 1> solve_symmetric<X, 1>(const Matrix<X>&, const Matrix<X, 1>
 template Matrix<X, X> solve_symmetric<X, X>(const Matrix<X>&, const Matrix<X, X>&);
 template Matrix<6> inverse_symmetric<6>(const Matrix<6>&);
 template Matrix<X> inverse_symmetric<X>(const Matrix<X>&);
-
-template Matrix<6> solve_definite<6, 6>(const Matrix<6>&, const Matrix<6>&);
-template Matrix<6, 12> solve_definite<6, 12>(const Matrix<6>&, const Matrix<6, 12>&);
-template Matrix<6, 13> solve_definite<6, 13>(const Matrix<6>&, const Matrix<6, 13>&);
-template Matrix<X, 1> solve_definite<X, 1>(const Matrix<X>&, const Matrix<X, 1>&);
 
 template Vector<6> solve_square<6>(const Matrix<6>&, const Vector<6>&);
 template Vector<X> solve_square<X>(const Matrix<X>&, const Vector<X>&);

@@ -4,10 +4,11 @@
 
 // Decompositions and large products of matrices, compiled once: each is hundreds of Eigen's templates, and a file that
 // asks Eigen for one compiles for many seconds longer. The sizes that inner loops use stand at the end of
-// linear_algebra.cpp, eigenvalues.cpp and products.cpp, and Eigen::Dynamic for all others.
+// linear_algebra.cpp, cholesky.cpp, eigenvalues.cpp and products.cpp, and Eigen::Dynamic for all others.
 
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "rooms.hpp"
@@ -37,6 +38,16 @@ Matrix<N> inverse_symmetric(const Matrix<N>& A);
 /// A^-1 b of a positive definite A, by L L^T.
 template <int N, int M>
 Matrix<N, M> solve_definite(const Matrix<N>& A, const Matrix<N, M>& b);
+
+/// A = L L^T, for who needs both A^-1 b and L^-1 b.
+template <int N>
+using Cholesky = Eigen::LLT<Matrix<N>>;
+template <int N>
+Cholesky<N> cholesky(const Matrix<N>& A);
+template <int N, int M>
+Matrix<N, M> solve_factored(const Cholesky<N>& factor, const Matrix<N, M>& b);
+template <int N, int M>
+Matrix<N, M> whitened(const Cholesky<N>& factor, const Matrix<N, M>& b);
 
 /// A^-1 b of a square A, by L U with pivots.
 template <int N>

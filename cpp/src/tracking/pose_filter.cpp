@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 #include "tracking/pose_filter.hpp"
-#include "math/constants.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
+#include "math/constants.hpp"
+#include "math/linear_algebra.hpp"
 
 namespace truing::tracking {
 namespace {
@@ -57,11 +57,11 @@ template <int N>
 bool fuse(const Eigen::Matrix<double, kStates, N>& PHt, const Eigen::Matrix<double, N, N>& S,
           const Eigen::Matrix<double, N, 1>& r, double gate, Belief* belief, double* nis,
           Eigen::Matrix<double, kStates, 1>* moved = nullptr) {
-  const Eigen::LLT<Eigen::Matrix<double, N, N>> factor(S);
-  const Eigen::Matrix<double, N, 1> weighted = factor.solve(r);
+  const Cholesky<N> factor = cholesky<N>(S);
+  const Eigen::Matrix<double, N, 1> weighted = solve_factored<N, 1>(factor, r);
   *nis = r.dot(weighted);
   if (!(*nis <= gate)) return false;
-  const Eigen::Matrix<double, N, kStates> half = factor.matrixL().solve(PHt.transpose());
+  const Eigen::Matrix<double, N, kStates> half = whitened<N, kStates>(factor, PHt.transpose());
   Eigen::Matrix<double, kStates, 1> change = PHt * weighted;
   const Eigen::Matrix2d clock = belief->P.block<2, 2>(kClock, kClock);
   belief->P.noalias() -= half.transpose() * half;

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "math/linear_algebra.hpp"
 
 namespace truing::tracking {
@@ -58,10 +56,10 @@ void ShiftWatch::push(const PoseGrade& grade, const Isometry3d* T_base_flange) {
   now.has_flange = T_base_flange != nullptr && grade.dimensions == 6;
   if (now.has_flange) now.T_base_flange = *T_base_flange;
   // Fraction of an innovation that is left after it was fused: R S^-1.
-  const Eigen::LLT<Matrix6d> factor(grade.S);
+  const Cholesky<6> factor = cholesky<6>(grade.S);
   now.kept = Matrix6d::Identity();
-  if (grade.accepted) now.kept -= factor.solve(grade.S - Matrix6d(grade.R.asDiagonal())).transpose();
-  now.u = factor.matrixL().solve(grade.innovation);
+  if (grade.accepted) now.kept -= solve_factored<6, 6>(factor, grade.S - Matrix6d(grade.R.asDiagonal())).transpose();
+  now.u = whitened<6, 1>(factor, grade.innovation);
   if (now.u.norm() > kClip) now.u *= kClip / now.u.norm();
   rejected_ = grade.accepted ? 0 : rejected_ + 1;
   quiet_ += seconds;
@@ -142,7 +140,7 @@ Vector6d ShiftWatch::find_jump(std::int64_t onset) const {
     right += left.transpose() * row(k).innovation;
     left = row(k).kept * left;
   }
-  return normal.ldlt().solve(right);
+  return solve_symmetric<6, 1>(normal, right);
 }
 
 void ShiftWatch::flag() {
