@@ -17,6 +17,7 @@ import math
 import os
 import resource
 import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,9 @@ UR10E_GAINS = (10.0, 10.6956, 8.4566, 9.0029, 9.4800, 10.1232)  # [Nm/A] publish
 START, END = "<!-- table -->", "<!-- end -->"
 USUAL_CUTOFF = 8.0  # [Hz]
 AHEAD = 0.5  # [s] of simulated motion, by joint
+USUAL_TESTS = (("h7_20s", "h12_40s"), ("ptp10",))  # of the UR10e
+ONE_JOINT_AT_A_TIME = ("single_j2", "single_j3", "single_j5")
+RUNS = 6  # of which the fastest is told
 SHARES = (0.2, 0.4, 0.5)  # of one recording held out, beside the usual 0.3: other blocks of its time
 MOVING = {"standard": "truing, its standard practice", "named": "truing, named"}
 HEADER = (
@@ -70,11 +74,15 @@ def robot_of(folder: Path, torque_per_ampere: Sequence[float] = ()) -> Robot:
     return robot
 
 
-def ur10e(folder: Path, held_out: Sequence[str]) -> Arm:
-    """All recordings without a load that are not marked as test, and these of the marked ones."""
+def ur10e(folder: Path, held_out: Sequence[str], left_out: Sequence[str] = ()) -> Arm:
+    """Fitted: all recordings without a load that are not marked as test, but those that are `left_out`."""
     robot = robot_of(folder, UR10E_GAINS)
     files = [file for file in sorted(folder.glob("*.csv")) if not file.stem.endswith("_load")]
-    recordings = [r for r in load_recordings(files, robot) if not r.test or r.name in held_out]
+    recordings = [
+        one.replace(test=one.name in held_out)
+        for one in load_recordings(files, robot)
+        if one.name in held_out or not (one.test or one.name in left_out)
+    ]
     checked = check_recordings(robot, recordings)
     return Arm(
         f"UR10e, {' + '.join(held_out)}", folder / "robot.urdf", checked.robot, list(checked.recordings)
@@ -92,7 +100,7 @@ def one_recording(name: str, folder: Path, cutoff: float | None = None) -> Arm:
 def arms(data: Path) -> list[Arm]:
     found = []
     if (folder := data / "dyn_ur10e").exists():
-        found += [ur10e(folder, ("h7_20s", "h12_40s")), ur10e(folder, ("ptp10",))]
+        found += [ur10e(folder, held_out) for held_out in USUAL_TESTS]
     if (folder := data / "dyn_tx40").exists():
         found.append(one_recording("TX40", folder, cutoff=20.0))
     if (folder := data / "dyn_ur10").exists():
@@ -114,6 +122,13 @@ def percent_of(found: TorqueDiagnosis, model: str, moving: bool = False) -> Floa
     """moving: of held-out rows in which the joint moves."""
     errors = next(e for e in found.errors if e.model == model)
     return np.array([joint.percent for joint in (errors.in_motion if moving else errors.held_out)])
+
+
+def in_percent(found: TorqueDiagnosis, model: str, moving: bool) -> str:
+    """Of every joint; – where no row is of that kind."""
+    errors = next(e for e in found.errors if e.model == model)
+    joints = errors.in_motion if moving else errors.held_out
+    return " ".join(f"{joint.percent:.1f}" if joint.n > 0 else "–" for joint in joints)
 
 
 def causes(found: TorqueDiagnosis, most: int = 6) -> str:
@@ -197,6 +212,47 @@ def splits(arm: Arm) -> list[str]:
     return [*lines, ""]
 
 
+def fewer_rows(folder: Path) -> list[str]:
+    """Recordings that move one joint at a time are not fitted: in them most joints rest."""
+    lines = ["**UR10e, recordings that move one joint at a time not fitted**", ""]
+    lines += ["| held out | standard practice | named | named, rows in which the joint moves |"]
+    lines += ["| --- | --- | --- | --- |"]
+    for held_out in (*USUAL_TESTS, ONE_JOINT_AT_A_TIME):
+        arm = ur10e(folder, held_out, left_out=ONE_JOINT_AT_A_TIME)
+        found = diagnose(arm.robot, arm.recordings, cutoff=arm.cutoff)
+        kinds = (("standard", False), ("named", False), ("named", True))
+        shown = " | ".join(in_percent(found, model, moving) for model, moving in kinds)
+        lines.append(f"| {' + '.join(held_out)} | {shown} |")
+    return [*lines, "", f"Named: {causes(found)}.", ""]
+
+
+def fitted_rows(arm: Arm) -> int:
+    return sum(len(one.time) for one in arm.recordings if not one.test)
+
+
+def seconds_of(folder: Path) -> list[str]:
+    """The whole diagnosis by the clock."""
+    threads = len(os.sched_getaffinity(0))
+    lines = [f"**Seconds of a diagnosis of the UR10e**, {threads} threads, the fastest of {RUNS} runs", ""]
+    lines += [
+        "| recordings fitted | their rows | by the clock | of the processor |",
+        "| --- | --- | --- | --- |",
+    ]
+    sets = {
+        "that move all joints at once": ur10e(folder, USUAL_TESTS[0], left_out=ONE_JOINT_AT_A_TIME),
+        "all": ur10e(folder, USUAL_TESTS[0]),
+    }
+    for name, arm in sets.items():
+        runs = []
+        for _ in range(RUNS):
+            clock, processor = time.perf_counter(), processor_seconds()
+            diagnose(arm.robot, arm.recordings, cutoff=arm.cutoff)
+            runs.append((time.perf_counter() - clock, processor_seconds() - processor))
+        clock, processor = min(runs)
+        lines.append(f"| {name} | {fitted_rows(arm)} | {clock:.2f} | {processor:.2f} |")
+    return [*lines, ""]
+
+
 def loaded(robot: Robot, file: Path) -> list[str]:
     """The recording with a load that nobody told, against the robot that was found."""
     untold = [
@@ -226,6 +282,10 @@ def report(data: Path, program: Path | None, figaroh: Path | None) -> list[str]:
             lines += loaded(found.robot, file)
         if len(arm.recordings) == 1:
             lines += splits(arm)
+    if (data / "dyn_ur10e").exists():
+        more = [*fewer_rows(data / "dyn_ur10e"), *seconds_of(data / "dyn_ur10e")]
+        print("\n".join(more), flush=True)
+        lines += more
     return lines
 
 
