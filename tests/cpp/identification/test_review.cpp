@@ -16,7 +16,10 @@ using truing::Mistake;
 
 namespace {
 
-std::vector<Robot> some_arms() { return {ur10(), palletizer(), rail_arm(), urdf_arm()}; }
+std::vector<Robot> some_arms() {
+  if (kSanitized) return {ur10(), palletizer()};
+  return {ur10(), palletizer(), rail_arm(), urdf_arm()};
+}
 
 /// An arm wrong by a millimetre and a milliradian, somewhere, and what a tracker sees of it.
 std::unique_ptr<Table> measured(const Robot& nominal, std::size_t rows, unsigned seed, What what = What::position) {
@@ -37,8 +40,9 @@ void scale(Table* table, Column* column, double factor) {
   *column = table->add(values);
 }
 
-/// The kind that must be said, and the words that must be in it.
-void check_said(const Robot& robot, const Measurements& data, const std::string& kind, const std::string& words) {
+/// The kind that must be said, and the words that must be in it. Gives all that is said.
+std::string check_said(const Robot& robot, const Measurements& data, const std::string& kind,
+                       const std::string& words) {
   const std::optional<Mistake> said = reviewed(robot, data);
   CAPTURE(robot.name);
   CAPTURE(kind);
@@ -47,6 +51,7 @@ void check_said(const Robot& robot, const Measurements& data, const std::string&
   CHECK(said->kind == kind);
   INFO(said->text);
   CHECK(said->text.find(words) != std::string::npos);
+  return said->text;
 }
 
 }  // namespace
@@ -212,6 +217,7 @@ TEST_CASE("clocks that differ are found of every arm that moves while it is meas
   const std::size_t rows = 600;
   for (const Robot& robot : some_arms()) {
     for (const double late : {-0.003, 0.035, 0.0}) {
+      if (kSanitized && late > 0.0) continue;
       Robot truth = perturbed(robot, 1e-3, 1e-3, 146);
       truth.T_measurement_base = somewhere();
       Table table(rows), then(rows);
@@ -236,8 +242,7 @@ TEST_CASE("clocks that differ are found of every arm that moves while it is meas
         const std::optional<Mistake> said = reviewed(robot, table.data);
         CHECK((!said || said->kind != "lag"));
       } else {
-        check_said(robot, table.data, "lag", late > 0.0 ? " ms earlier" : " ms later");
-        const std::string text = reviewed(robot, table.data)->text;
+        const std::string text = check_said(robot, table.data, "lag", late > 0.0 ? " ms earlier" : " ms later");
         const double found = std::stod(text.substr(text.find("were ") + 5));
         CHECK(found == doctest::Approx(1e3 * std::abs(late)).epsilon(0.02));
         if (std::abs(late) > 0.01) continue;
