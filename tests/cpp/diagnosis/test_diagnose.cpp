@@ -921,10 +921,11 @@ static void measure_again(Table* table, const std::function<std::size_t(std::siz
 }
 
 TEST_CASE("diagnose goes on with the rows after one that is missing, or measured twice") {
+  const Diagnosis right = diagnose(light_arm(), measured(light_arm(), 120, 917)->data);
   for (const int shift : {-2, -1, 1, 3}) {
     for (const std::size_t at : {std::size_t{30}, std::size_t{104}}) {
+      if (kSanitized && at > 30) continue;
       auto table = measured(light_arm(), 120, 917);
-      const Diagnosis right = diagnose(light_arm(), table->data);
       measure_again(table.get(), [&](std::size_t row) {
         const std::size_t paired = row < at ? row : row - static_cast<std::size_t>(shift + 200) + 200;
         return std::min<std::size_t>(paired, 119);
