@@ -133,6 +133,7 @@ class _Projection:
 
 
 def _projected(weighed: Floats, rows: Rows, sigma: Floats) -> _Projection:
+    """Least squares by all columns, as `_weighed` gives them: the shortest where several would do."""
     torque = (rows.torque / sigma)[~np.isnan(rows.torque)]
     size = np.linalg.norm(weighed, axis=0)
     there = size > 0.0
@@ -184,9 +185,10 @@ def _fitted(robot: _core.Robot, rows: Rows, distances: Sequence[_Distance]) -> _
     value = file
     here, now = at(value)
     for _ in range(TURNS):
-        made = columns(value) @ here.values
-        moved = [(columns(value + STEP * axis) @ here.values - made) / STEP for axis in np.eye(len(file))]
-        jacobian = -here.beyond(np.column_stack(moved))
+        moved = [columns(value + STEP * axis) @ here.values for axis in np.eye(len(file))]
+        jacobian = (
+            -here.beyond(np.column_stack(moved)) / STEP
+        )  # beyond() of those that did not move is nought
         normal = jacobian.T @ jacobian + np.diag(prior**-2.0)
         step = np.linalg.solve(normal, -jacobian.T @ here.left - (value - file) / prior**2)
         other, then = at(value + step)
