@@ -30,6 +30,7 @@ import truing
 from truing.dynamics import (
     Recording,
     TorqueDiagnosis,
+    TorqueError,
     check_recordings,
     diagnose,
     load_recordings,
@@ -118,17 +119,14 @@ def line(name: str, percent: Floats, named: Floats, seconds: float | None = None
     return f"| {name} | {' '.join(f'{one:.1f}' for one in percent)} | {times:.2f} | {took} |"
 
 
+def joints_of(found: TorqueDiagnosis, model: str, moving: bool = False) -> Sequence[TorqueError]:
+    """Held-out errors of every joint. moving: of rows in which the joint moves."""
+    errors = next(e for e in found.errors if e.model == model)
+    return errors.in_motion if moving else errors.held_out
+
+
 def percent_of(found: TorqueDiagnosis, model: str, moving: bool = False) -> Floats:
-    """moving: of held-out rows in which the joint moves."""
-    errors = next(e for e in found.errors if e.model == model)
-    return np.array([joint.percent for joint in (errors.in_motion if moving else errors.held_out)])
-
-
-def in_percent(found: TorqueDiagnosis, model: str, moving: bool) -> str:
-    """Of every joint; – where no row is of that kind."""
-    errors = next(e for e in found.errors if e.model == model)
-    joints = errors.in_motion if moving else errors.held_out
-    return " ".join(f"{joint.percent:.1f}" if joint.n > 0 else "–" for joint in joints)
+    return np.array([joint.percent for joint in joints_of(found, model, moving)])
 
 
 def causes(found: TorqueDiagnosis, most: int = 6) -> str:
@@ -221,9 +219,10 @@ def fewer_rows(folder: Path) -> list[str]:
         arm = ur10e(folder, held_out, left_out=ONE_JOINT_AT_A_TIME)
         found = diagnose(arm.robot, arm.recordings, cutoff=arm.cutoff)
         kinds = (("standard", False), ("named", False), ("named", True))
-        shown = " | ".join(in_percent(found, model, moving) for model, moving in kinds)
+        errors = [[(e.percent, e.n) for e in joints_of(found, *kind)] for kind in kinds]
+        shown = " | ".join(" ".join(f"{p:.1f}" if n > 0 else "–" for p, n in joints) for joints in errors)
         lines.append(f"| {' + '.join(held_out)} | {shown} |")
-    return [*lines, "", f"Named: {causes(found)}.", ""]
+    return [*lines, ""]
 
 
 def fitted_rows(arm: Arm) -> int:
