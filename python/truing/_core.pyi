@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import types
 import typing
-__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'HeldOutFall', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'Motion', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'inferred_speeds', 'joint_motion', 'lacks_directions', 'lacks_speeds', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'links_off_chain', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_columns', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
+__all__: list[str] = ['Alternative', 'Anchor', 'AppliedEffect', 'BeforeAfter', 'Branches', 'Camera', 'Candidate', 'CatalogueEffect', 'ClockEstimate', 'ClockOffset', 'ClosedForm', 'ColumnGain', 'CompensateOptions', 'Compensated', 'Compensation', 'CompensationRow', 'Compensations', 'Compensator', 'Conditions', 'Contact', 'CorrectionLimits', 'Curve', 'Detectable', 'DeviationOptions', 'DiagnoseOptions', 'Diagnosis', 'Distinction', 'DistinguishOptions', 'EffectPair', 'EffectRequest', 'EffectSize', 'EffectTraits', 'ErrorStatistics', 'FilterOptions', 'FlexibleMode', 'FoundEffect', 'FoundTorqueEffect', 'FramesResult', 'FreeParameter', 'Frozen', 'GroupChoice', 'HandEyeConcern', 'HandEyeErrors', 'HandEyeKinematics', 'HandEyeNoise', 'HandEyeOptions', 'HandEyePlanOptions', 'HandEyePoses', 'HandEyeResidual', 'HandEyeResult', 'HeldOutFall', 'Identification', 'IdentifyOptions', 'ImuErrors', 'InertialResult', 'InverseOptions', 'InverseSolver', 'Joint', 'JointPath', 'LinkCapsule', 'Measurements', 'Mistake', 'ModalModel', 'ModesResult', 'Motion', 'NextHandPose', 'NextPose', 'NotTestable', 'Obstacle', 'OwnEffect', 'Parameter', 'PathGap', 'PathOptions', 'PlanOptions', 'PlanResult', 'PosePrediction', 'PositionError', 'Prediction', 'Reading', 'RecordedStreams', 'Recording', 'ReplayResult', 'Residuals', 'RestPose', 'Robot', 'RowSums', 'SanityFinding', 'Scene', 'SeenColumns', 'ServoArm', 'ServoBodies', 'ServoPath', 'ServoRecording', 'ServoSet', 'ServoWindow', 'Share', 'Shift', 'SimulatedStreams', 'Solution', 'Solutions', 'SolverSummary', 'StreamSimulationOptions', 'Target', 'Task', 'ToolResult', 'TorqueAlternative', 'TorqueBlock', 'TorqueClass', 'TorqueColumns', 'TorqueDiagnoseOptions', 'TorqueDiagnosis', 'TorqueEffectPair', 'TorqueEffectSize', 'TorqueError', 'TorqueErrors', 'TorqueFit', 'TorqueOptions', 'TorqueOrder', 'TorqueOutlook', 'TorquePlan', 'TorquePlanOptions', 'TorquePrediction', 'TorqueRegime', 'TorqueRun', 'TorqueSumOptions', 'TorqueTrace', 'TrackOptions', 'TrackSetup', 'Tracker', 'TrackerErrors', 'TrackerNoise', 'UncertainFrame', 'UnknownEffect', 'UnknownTorque', 'Unobservable', 'WatchOptions', 'WhereInput', 'WhereJoint', 'WorkspaceCell', 'assemble_setup', 'calibrate_frames', 'calibrate_inertial', 'calibrate_tool', 'catalogue', 'catalogue_effects', 'choose_groups', 'diagnose', 'distinguish', 'dynamics_diagnose', 'dynamics_identify', 'dynamics_plan', 'dynamics_predict', 'find_rests', 'flange_poses', 'forward_kinematics', 'frame_from_xyz_rpy', 'free_parameters', 'gravity_torque_rows', 'gravity_torques', 'handeye', 'handeye_clock', 'handeye_closed_form', 'handeye_plan', 'handeye_readings', 'handeye_with_kinematics', 'identify', 'identify_modes', 'inferred_directions', 'inferred_speeds', 'joint_motion', 'lacks_directions', 'lacks_speeds', 'large_boom', 'large_boom_modes', 'last_moving_link', 'link_parameters', 'links_off_chain', 'nearest_contact', 'noise_from_repeats', 'plan', 'pose_groups', 'predict', 'project', 'rank_columns', 'replay', 'residuals', 'review', 'rigid_torques', 'robot_at', 'robot_from_urdf', 'robot_with_torques', 'rotation_from_rpy', 'rpy_from_rotation', 'seen_columns', 'servo_fields', 'servo_inputs', 'simulate_servos', 'simulate_servos_apart', 'simulate_streams', 'sum_columns', 'sum_rows', 'sum_torques', 'torque_columns', 'torque_effects', 'torque_regressor', 'torques_of_bodies', 'urdf_with_calibration', 'validate_measurements', 'validate_recording', 'validate_robot', 'validate_scene', 'version']
 class Parameter:
     """
     One parameter of a result. Names: `J2.a`, `J3.ratio`, `tool.x`, `base.rz`, `backlash.J3`,
@@ -7331,6 +7331,39 @@ class TorqueRegime:
         """
         [Nm | N] rms error that standard practice leaves there.
         """
+class TorqueOrder:
+    """
+    Waves of the torque that are left and repeat with the turn of a joint, so often that something turns
+    faster behind it: its motor (as often as the gear reduces), the wave generator of a harmonic drive
+    (twice as often), teeth.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def amplitude(self) -> float:
+        """
+        [Nm] of the waves, low-passed.
+        """
+    @property
+    def joint(self) -> str:
+        """
+        Its name.
+        """
+    @property
+    def order(self) -> float:
+        """
+        Waves in a turn of the joint, to half of one.
+        """
+    @property
+    def share(self) -> float:
+        """
+        Of the squares that what was named leaves at this joint while it moves.
+        """
+    @property
+    def with_direction(self) -> bool:
+        """
+        They change their sign with the direction of motion, as friction does.
+        """
 class TorqueClass:
     """
     What cannot be told apart from these recordings.
@@ -7438,6 +7471,11 @@ class TorqueDiagnosis:
     def not_testable(self) -> tuple[NotTestable, ...]:
         """
         What the recordings could not show.
+        """
+    @property
+    def orders(self) -> tuple[TorqueOrder, ...]:
+        """
+        What is left and repeats many times a turn.
         """
     @property
     def remainders(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@
 #include "dynamics/beside.hpp"
 #include "dynamics/effects/families.hpp"
 #include "dynamics/judge.hpp"
+#include "dynamics/orders.hpp"
 #include "dynamics/payload.hpp"
 #include "dynamics/remainder.hpp"
 #include "estimation/confidence.hpp"
@@ -918,6 +919,7 @@ TorqueDiagnosis named(const Problem& problem, const Groundwork& groundwork, cons
     out.robot = with_groundwork(problem, groundwork.design, bodies, {}, false);
   }
   out.where = regimes_of(problem, groundwork.model, model);
+  out.orders = orders_left(problem, model);
   out.classes = classes_of(out.effects, own, payload_varies(problem.range));
   out.not_testable = account.design->not_testable;
   out.traces = traces_of(problem, groundwork.model, model);

@@ -23,6 +23,11 @@ std::string errors_line(const TorqueErrors& errors) {
   return out + " %\n";
 }
 
+std::string order_line(const TorqueOrder& o) {
+  return formatted("left: %g waves a turn of %s%s, %.3g Nm, %.1f %% of what is left while it moves\n", o.order,
+                   o.joint.c_str(), o.with_direction ? ", with the direction" : "", o.amplitude, 100.0 * o.share);
+}
+
 std::string summary(const TorqueDiagnosis& d) {
   std::string out = d.sentence + "\nheld-out torque, rms error in % of its standard deviation\n";
   for (const TorqueErrors& errors : d.errors) out += errors_line(errors);
@@ -33,6 +38,7 @@ std::string summary(const TorqueDiagnosis& d) {
     out += "\n";
   }
   for (const UnknownTorque& u : d.unknown) out += "unknown, at " + u.joint + ", over " + joined(u.inputs) + "\n";
+  for (const TorqueOrder& o : d.orders) out += order_line(o);
   for (const std::string& w : d.warnings) out += "warning: " + w + "\n";
   return out;
 }
@@ -65,6 +71,10 @@ void bind_found(py::module_& m) {
   });
   auto regime = define_result<TorqueRegime>(m, "TorqueRegime");
   regime.def("__repr__", [](const TorqueRegime& r) { return "TorqueRegime(" + r.joint + ", " + r.input + ")"; });
+  auto order = define_result<TorqueOrder>(m, "TorqueOrder");
+  order.def("__repr__", [](const TorqueOrder& o) {
+    return formatted("TorqueOrder(%s, %g waves a turn, %.3g Nm)", o.joint.c_str(), o.order, o.amplitude);
+  });
   auto one_class = define_result<TorqueClass>(m, "TorqueClass");
   one_class.def("__repr__", [](const TorqueClass& c) { return "TorqueClass(" + c.sentence + ")"; });
   auto trace = define_result<TorqueTrace>(m, "TorqueTrace");

@@ -21,6 +21,7 @@ from truing._core import (
     TorqueErrors as TorqueErrors,
     TorqueFit as TorqueFit,
     TorqueOptions as TorqueOptions,
+    TorqueOrder as TorqueOrder,
     TorqueOutlook as TorqueOutlook,
     TorquePlan as TorquePlan,
     TorquePlanOptions as TorquePlanOptions,

@@ -712,7 +712,8 @@ def _where(page: Page, result: Mapping[str, Any]) -> None:
         " % of the joint's torque</span></h2>"
     )
     page.chart("where", _heat(z, texts, joints, len(columns)), _heat_layout(columns, inputs), size="heat")
-    page.add(f'<p class="note">{_where_words(result)}</p></section>')
+    words = f"{_where_words(result)} {escaped(orders_sentence(result.get('orders', ())))}"
+    page.add(f'<p class="note">{words}</p></section>')
 
 
 def _spreads(result: Mapping[str, Any]) -> dict[str, float]:
@@ -803,6 +804,21 @@ def _where_words(result: Mapping[str, Any]) -> str:
     if inputs:
         text += f"; it was least even over {' and '.join(w['input'] for w in inputs)}"
     return text + ". White: no error; empty parts had too little motion."
+
+
+def orders_sentence(orders: Sequence[Mapping[str, Any]]) -> str:
+    """What is left and repeats with the turn of a joint, by joint; empty where nothing does."""
+    if not orders:
+        return ""
+    waves = [
+        f"{o['joint']} {o['order']:g} a turn{' with the direction of motion' if o['with_direction'] else ''}"
+        f" ({figures_text(o['amplitude'])} {o['unit']}, {_percent(100.0 * o['share'])} of what is left there)"
+        for o in orders
+    ]
+    return (
+        f"What is left repeats over the joint's angle: {_listed(waves)}. So often a motor turns behind a gear"
+        " of that ratio; behind a harmonic drive half as often."
+    )
 
 
 # ---- What is unknown, not told apart, not tested ---------------------------------------------------

@@ -71,6 +71,7 @@ def diagnosis_dict(
         "covariance": covariance_dict(parameters_of(found), found.covariance),
         "unknown": [_unknown(u) for u in found.unknown],
         "remainders": list(found.remainders),
+        "orders": [_order(o) for o in found.orders],
         "where": where_dict(found.where, found.errors),
         **_errors(found.errors),
         "without_names_percent": found.without_names,
@@ -147,6 +148,17 @@ def _load(load: FoundLoad) -> dict[str, Any]:
         "rms_Nm": None,
         "confounded_with": [],
         "sentence": load.sentence,
+    }
+
+
+def _order(order: _core.TorqueOrder) -> dict[str, Any]:
+    return {
+        "joint": order.joint,
+        "order": order.order,
+        "with_direction": order.with_direction,
+        "amplitude": order.amplitude,
+        "unit": "Nm",
+        "share": order.share,
     }
 
 

@@ -237,6 +237,7 @@ TEST_CASE("what gives way under load and stays is unknown over the load and its 
 TEST_CASE("where nothing is hidden there is no remainder") {
   const TorqueDiagnosis d = dynamics::diagnose(level_arm(), recorded(with_friction(level_arm())));
   CHECK(d.remainders.empty());
+  CHECK(d.orders.empty());
   const std::vector<TorqueError>&named = held_out(d, "named"), &whole = held_out(d, "with_unknown");
   for (std::size_t j = 0; j < named.size(); ++j) CHECK(whole[j].rms == named[j].rms);
 }

@@ -76,6 +76,16 @@ struct TorqueRegime {
   double n = 0.0;         ///< number of rows
 };
 
+/// Waves of the torque that are left and repeat with the turn of a joint, so often that something turns faster behind
+/// it: its motor (as often as the gear reduces), the wave generator of a harmonic drive (twice as often), teeth.
+struct TorqueOrder {
+  std::string joint;            ///< its name
+  double order = 0.0;           ///< waves in a turn of the joint, to half of one
+  bool with_direction = false;  ///< they change their sign with the direction of motion, as friction does
+  double amplitude = 0.0;       ///< [Nm] of the waves, low-passed
+  double share = 0.0;           ///< of the squares that what was named leaves at this joint while it moves
+};
+
 /// What cannot be told apart from these recordings.
 struct TorqueClass {
   std::vector<std::string> effects;  ///< 'motor_constant:J2', 'payload' …
@@ -108,6 +118,7 @@ struct TorqueDiagnosis {
   std::vector<TorqueErrors> errors;       ///< 'nominal', 'standard', 'named', 'with_unknown'
   double without_names = 0.0;             ///< [%] held-out error, geometric mean over the joints, that names start from
   std::vector<TorqueRegime> where;        ///< the gap by joint and part of the motion
+  std::vector<TorqueOrder> orders;        ///< what is left and repeats many times a turn
   std::vector<TorqueClass> classes;       ///< what cannot be told apart
   std::vector<NotTestable> not_testable;  ///< what the recordings could not show
   std::vector<TorqueTrace> traces;        ///< a held-out stretch of every joint

@@ -162,7 +162,7 @@ class Command(TorqueCommand[Answer | ServoAnswer]):
 
 def print_diagnosis(result: Mapping[str, Any]) -> None:
     """What looks wrong with the recordings, the verdict, the errors, and the causes."""
-    from truing.dynamics.page import remainder_sentence
+    from truing.dynamics.page import orders_sentence, remainder_sentence
 
     print_findings(result)
     say(result["sentence"])
@@ -181,8 +181,9 @@ def print_diagnosis(result: Mapping[str, Any]) -> None:
         say(f"and {len(lines) - LISTED} more: see the report")
     for unknown in result["unknown"]:
         say(f"unknown: something at {unknown['joint']} goes with {joined(unknown['inputs'], 3)}")
-    if sentence := remainder_sentence(result["remainders"]):
-        say(f"note: {sentence}")
+    for sentence in (remainder_sentence(result["remainders"]), orders_sentence(result["orders"])):
+        if sentence:
+            say(f"note: {sentence}")
     for one in result["classes"][:3]:
         say(f"note: {one['sentence']}")
     if result["not_testable"]:

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 the truing authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is left and repeats many times a turn of a joint: gears and motors that turn faster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import truing
+from truing._core import TorqueOrder
+from truing.dynamics import Recording, TorqueDiagnosis, diagnose, load_recordings
+from truing.dynamics.page import orders_sentence
+from truing.dynamics.result import diagnosis_dict
+from truing.testing.dynamics import HIDDEN, simulate_motion
+
+Floats = NDArray[np.float64]
+
+REAL = Path(os.environ.get("TRUING_REALDATA", ""))
+
+
+def with_waves(one: Recording, joint: int, order: float, amplitude: float, *, directed: bool) -> Recording:
+    torque = np.array(one.torque)
+    angle = np.asarray(one.position)[:, joint]
+    way = np.sign(np.gradient(angle)) if directed else 1.0
+    torque[:, joint] += amplitude * way * np.sin(order * angle + 0.4)
+    return one.replace(torque=torque)
+
+
+def diagnosed(seed: int, joint: int, order: float, amplitude: float, *, directed: bool) -> TorqueDiagnosis:
+    simulated = simulate_motion(seed=seed, hidden={})
+    waved = [with_waves(r, joint, order, amplitude, directed=directed) for r in simulated.recordings]
+    return diagnose(simulated.nominal, waved)
+
+
+@pytest.mark.parametrize(("seed", "joint", "order"), [(1, 0, 80.0), (2, 3, 50.5), (3, 5, 101.0)])
+@pytest.mark.parametrize("directed", [False, True])
+def test_waves_of_a_gear_are_found_with_their_size(
+    seed: int, joint: int, order: float, directed: bool
+) -> None:
+    amplitude = 0.05 * float(np.std(simulate_motion(seed=seed, hidden={}).recordings[0].torque[:, joint]))
+    found = diagnosed(seed, joint, order, amplitude, directed=directed)
+    (one,) = found.orders
+    assert one.joint == f"J{joint + 1}"
+    assert one.order == pytest.approx(order, abs=0.5)
+    assert one.with_direction == directed
+    assert one.amplitude == pytest.approx(amplitude, rel=0.25)
+    assert 0.05 < one.share < 1.0
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_noise_and_laws_of_the_angle_have_no_order(seed: int) -> None:
+    law = {"ripple": (["J1"], {"ripple.J1.sin4": 1.0, "ripple.J1.cos4": 0.5})}
+    for hidden in ({}, HIDDEN, law):
+        simulated = simulate_motion(seed=seed, hidden=hidden)
+        assert not diagnose(simulated.nominal, simulated.recordings).orders
+
+
+def test_the_result_and_the_sentence_say_where_and_how_large() -> None:
+    found = diagnosed(1, 0, 80.0, 0.5, directed=True)
+    (one,) = diagnosis_dict(found)["orders"]
+    assert one.keys() == {"joint", "order", "with_direction", "amplitude", "unit", "share"}
+    assert "J1 80 a turn with the direction of motion (0.4" in orders_sentence([one])
+    assert orders_sentence([]) == ""
+    assert "left: 80 waves a turn of J1, with the direction" in found.summary()
+
+
+@pytest.mark.realdata
+def test_gears_of_real_arms_are_seen_in_their_torques() -> None:
+    """A TX40 reduces its first joint by 32, harmonic drives of a UR10e by 101: two waves a motor turn."""
+    tx40, cutoff = real("dyn_tx40"), 20.0
+    (first,) = diagnosed_real(tx40, [tx40 / "run.csv"], cutoff)
+    assert (first.joint, first.order, first.with_direction) == ("joint_1", 32.0, True)
+    ur10e = real("dyn_ur10e")
+    orders = diagnosed_real(ur10e, sorted(ur10e.glob("h*0s.csv")), 8.0)
+    waves = [one.order for one in orders if one.joint == "wrist_1_joint"]
+    assert waves == [pytest.approx(202.0, abs=1.0)]
+    assert all(abs(one.order - 202.0) <= 4.0 or abs(one.order - 101.0) <= 2.0 for one in orders)
+
+
+def real(folder: str) -> Path:
+    path = REAL / folder
+    if not os.environ.get("TRUING_REALDATA") or not path.exists():
+        pytest.skip(f"TRUING_REALDATA does not hold {folder}")
+    return path
+
+
+def diagnosed_real(folder: Path, files: list[Path], cutoff: float) -> Sequence[TorqueOrder]:
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    for index in robot.driven_joints():
+        robot.joints[index].torque_per_ampere = 10.0  # orders need no units
+    return diagnose(robot, load_recordings(files, robot), cutoff=cutoff).orders
