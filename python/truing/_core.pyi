@@ -565,8 +565,8 @@ class Robot:
     def fitted_range(self) -> types.MappingProxyType[str, tuple[float, float]]:
         """
         Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m], 'qd1' …
-        [rad/s | m/s], 'payload' [kg], 'temp' [deg C]. Beyond it nobody has seen what they do. Empty: not
-        known.
+        [rad/s | m/s], 'payload' [kg], 'temp' [deg C], and 'frequency' [Hz] of the motion and torques that
+        effects on torques were fitted on. Beyond it nobody has seen what they do. Empty: not known.
         """
     @fitted_range.setter
     def fitted_range(self, arg1: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
@@ -7160,6 +7160,11 @@ class TorquePrediction:
         Shape=(n, joints) [A] of drives whose torque per ampere is known, else NaN.
         """
     @property
+    def cutoff(self) -> float:
+        """
+        [Hz] of the low-pass that the angles went through for their derivatives.
+        """
+    @property
     def time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         Shape=(n,) [s] as recorded.
@@ -8231,9 +8236,10 @@ def dynamics_plan(robot: Robot, options: TorquePlanOptions | None = None, record
     recordings: looked at as well, for what they can show. Raises InputError: options, names or recordings that cannot be
     used, a robot without masses, a joint without room to move.
     """
-def dynamics_predict(robot: Robot, recording: Recording, cutoff: typing.SupportsFloat | typing.SupportsIndex = 8.0, own_effects: collections.abc.Sequence[typing.Any] = []) -> TorquePrediction:
+def dynamics_predict(robot: Robot, recording: Recording, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, own_effects: collections.abc.Sequence[typing.Any] = []) -> TorquePrediction:
     """
-    Torques of every row of a recording: links, rotors, and the effects that the robot carries.
+    Torques of every row of a recording: links, rotors, and the effects that the robot carries. cutoff: [Hz];
+    None: the highest frequency that the robot's effects were fitted on, or what is usual.
     
     Raises InputError on a recording that cannot be used.
     """

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "dynamics/problem.hpp"
 #include "truing/dynamics/identify.hpp"
@@ -33,10 +34,17 @@ struct Predicted {
   }
 };
 
+/// The highest frequency that the robot's effects were fitted on, or what is usual [Hz].
+double fitted_cutoff(const Robot& robot) {
+  const auto fitted = robot.fitted_range.find("frequency");
+  return fitted == robot.fitted_range.end() ? kUsualCutoff : fitted->second.second;
+}
+
 }  // namespace
 
-TorquePrediction predict(const Robot& robot, const Recording& recording, double cutoff,
+TorquePrediction predict(const Robot& robot, const Recording& recording, std::optional<double> given,
                          const std::vector<TorqueEffect>& own_effects) {
+  const double cutoff = given ? *given : fitted_cutoff(robot);
   if (!(cutoff > 0.0) || !std::isfinite(cutoff)) throw std::invalid_argument("cutoff must be above 0 Hz");
   validate(robot);
   validate(recording, robot);
@@ -67,6 +75,7 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, double 
     return true;
   });
   TorquePrediction out;
+  out.cutoff = cutoff;
   out.time = recording.time;
   out.torque.resize(recording.time.size(), static_cast<Index>(robot.driven_count()));
   out.current = MatrixXd::Constant(out.torque.rows(), out.torque.cols(), std::numeric_limits<double>::quiet_NaN());

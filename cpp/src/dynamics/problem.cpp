@@ -167,6 +167,7 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
   warn_of_payloads(recordings, &warnings);
   range = range_of(tiles);
   range.turns = turns_of(robot);
+  range.frequency = tiles.options().cutoff;
   if (range.speed.maxCoeff() < kSpeedAtRest) {
     throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
                                 math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing" +
@@ -510,6 +511,7 @@ Robot applied(const Robot& robot, const TorqueDesign& design, const std::vector<
     out.fitted_range["q" + number] = {range.lower[j], range.upper[j]};
     out.fitted_range["qd" + number] = {-range.speed[j], range.speed[j]};
   }
+  if (range.frequency > 0.0) out.fitted_range["frequency"] = {0.0, range.frequency};
   return out;
 }
 

@@ -278,7 +278,7 @@ std::size_t Robot::joint_index(const std::string& joint_name) const {
 
 /// A name that Robot::fitted_range may have.
 static bool is_input(const std::string& name, const Robot& robot) {
-  if (name == "payload" || name == "temp") return true;
+  if (name == "payload" || name == "temp" || name == "frequency") return true;
   for (std::size_t k = 1; k <= robot.driven_count(); ++k) {
     const std::string number = std::to_string(k);
     if (name == "q" + number || name == "qd" + number) return true;
@@ -310,7 +310,7 @@ void validate(const Robot& robot) {
     if (!(std::isfinite(ends.first) && std::isfinite(ends.second) && ends.first <= ends.second))
       refuse(where, "fitted_range of '" + name + "' is not a smallest and a largest value");
     if (!is_input(name, robot))
-      refuse(where, "fitted_range has '" + name + "', expected q1 ..., qd1 ..., payload or temp");
+      refuse(where, "fitted_range has '" + name + "', expected q1 ..., qd1 ..., payload, temp or frequency");
   }
 }
 

@@ -190,15 +190,17 @@ Raises InputError on recordings or options that cannot be used.)");
 Raises InputError on recordings or options that cannot be used.)");
   m.def(
       "dynamics_predict",
-      [](const Robot& given_robot, const Recording& recording, double cutoff, const std::vector<py::object>& own) {
+      [](const Robot& given_robot, const Recording& recording, std::optional<double> cutoff,
+         const std::vector<py::object>& own) {
         const Robot robot = given_robot;
         const std::vector<TorqueEffect> effects = torque_effects_evaluated_when_asked(own);
         const py::gil_scoped_release unlocked;
         return dynamics::predict(robot, recording, cutoff, effects);
       },
-      py::arg("robot"), py::arg("recording"), py::arg("cutoff") = kUsualCutoff,
+      py::arg("robot"), py::arg("recording"), py::arg("cutoff") = py::none(),
       py::arg("own_effects") = std::vector<py::object>{},
-      R"(Torques of every row of a recording: links, rotors, and the effects that the robot carries.
+      R"(Torques of every row of a recording: links, rotors, and the effects that the robot carries. cutoff: [Hz];
+None: the highest frequency that the robot's effects were fitted on, or what is usual.
 
 Raises InputError on a recording that cannot be used.)");
 }

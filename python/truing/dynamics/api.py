@@ -178,13 +178,11 @@ def predict(
 ) -> TorquePrediction:
     """Torques of every row of a recording: links, rotors, and the effects that the robot carries.
 
-    cutoff: [Hz] of the low-pass without phase that the angles go through for their derivatives; None: as in
-    TorqueOptions.
+    cutoff: [Hz] of the low-pass without phase that the angles go through for their derivatives; None: the
+    highest frequency that the robot's effects were fitted on, or as in TorqueOptions.
     effects: definitions of the own effects that the robot carries.
 
     Raises InputError on a recording that cannot be used.
     """
     own = own_torque_effects(effects, robot)
-    return _core.dynamics_predict(
-        robot, recording, own_effects=own, **({} if cutoff is None else {"cutoff": cutoff})
-    )
+    return _core.dynamics_predict(robot, recording, cutoff, own)

@@ -362,7 +362,6 @@ def prediction_dict(
     predicted: _core.TorquePrediction,
     response: Response | None = None,
     *,
-    cutoff: float,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
     """What ``result.json`` of ``truing dynamics predict`` holds; errors only of joints that were measured.
@@ -387,7 +386,7 @@ def prediction_dict(
         "robot": robot.name,
         "recording": recording.name,
         "rows": len(recording),
-        "cutoff_hz": cutoff,
+        "cutoff_hz": predicted.cutoff,
         "errors": errors,
         "simulated": None if response is None else _response_dict(robot, recording, response),
         "warnings": [*warnings, *assumed_drives(robot, recording)],
@@ -526,7 +525,6 @@ def write_prediction(
     predicted: _core.TorquePrediction,
     response: Response | None = None,
     *,
-    cutoff: float,
     warnings: Iterable[str] = (),
 ) -> dict[str, Any]:
     """Writes everything that ``truing dynamics predict`` found, and returns what result.json holds.
@@ -534,7 +532,7 @@ def write_prediction(
     `response`: of `truing.dynamics.simulate.simulated_response`.
     """
     result: dict[str, Any] = without_nan(
-        prediction_dict(robot, recording, predicted, response, cutoff=cutoff, warnings=warnings)
+        prediction_dict(robot, recording, predicted, response, warnings=warnings)
     )
     columns = prediction_columns(robot, recording, predicted)
     if response is not None:

@@ -739,7 +739,9 @@ class _Writer:
             lines.append("torque_effects:  # values in SI units (Nm, Nm s/rad ...), whatever `units` says")
             lines += [f"  - {self._effect(effect)}" for effect in robot.torque_effects]
         if robot.fitted_range:
-            lines.append("fitted_range:  # of the inputs that the effects were fitted on (rad, m, kg, deg C)")
+            lines.append(
+                "fitted_range:  # of the inputs that the effects were fitted on (rad, m, kg, deg C, Hz)"
+            )
             lines += [
                 f"  {_quoted(name)}: {self._vector(ends, _SI)}" for name, ends in robot.fitted_range.items()
             ]

@@ -260,6 +260,7 @@ TEST_CASE("validate refuses what no machine has: angles of 1e50, thousands of jo
 TEST_CASE("validate refuses ranges that are none, and of what is no input") {
   Robot robot = oblique_arm();
   robot.fitted_range = {{"q1", {-1.0, 1.0}}, {"qd1", {-2.0, 2.0}}, {"payload", {0.0, 0.0}}, {"temp", {18.0, 25.0}}};
+  robot.fitted_range["frequency"] = {0.0, 8.0};
   CHECK(complaint(robot) == "");
   robot.fitted_range["q1"] = {1.0, -1.0};
   CHECK(contains(complaint(robot), "fitted_range of 'q1'"));

@@ -27,6 +27,7 @@ from truing.dynamics.result import (
     write_prediction,
 )
 from truing.dynamics.sanity.findings import FoundParameter
+from truing.errors import InputError
 from truing.report.arrays import unpacked
 from truing.testing.dynamics import HIDDEN, SimulatedMotion, demo_arm, simulate_motion
 
@@ -242,7 +243,7 @@ def test_a_fit_writes_its_parameters_with_errors(simulated: SimulatedMotion, tmp
 def test_a_prediction_has_the_columns_that_were_measured(simulated: SimulatedMotion, tmp_path: Path) -> None:
     recording = simulated.recordings[0]
     predicted = predict(simulated.truth, recording)
-    write_prediction(tmp_path, simulated.truth, recording, predicted, cutoff=8.0)
+    write_prediction(tmp_path, simulated.truth, recording, predicted)
     with (tmp_path / "predicted.csv").open(encoding="utf-8") as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["t_s", *(f"tau{k}_Nm" for k in range(1, 7))]
@@ -299,3 +300,19 @@ def test_errors_in_motion_are_said_where_rests_make_a_difference() -> None:
 
     assert "named effects leave J1 5.1" in said(6.0, 5.1)
     assert said(2.0, 1.95) == said(None, None) == ""
+
+
+def test_predict_low_passes_where_the_robot_was_fitted(simulated: SimulatedMotion, tmp_path: Path) -> None:
+    recording = simulated.recordings[-1]
+    found = identify(simulated.nominal, simulated.recordings, cutoff=12.0).robot
+    truing.save_robot(tmp_path / "robot.yaml", found)
+    robot = truing.load_robot(tmp_path / "robot.yaml")
+    assert robot.fitted_range["frequency"] == (0.0, 12.0)
+    predicted = predict(robot, recording)
+    assert predicted.cutoff == 12.0
+    assert (predicted.torque == predict(robot, recording, cutoff=12.0).torque).all()
+    assert predict(robot, recording, cutoff=5.0).cutoff == 5.0
+    assert predict(simulated.nominal, recording).cutoff == 8.0
+    never = robot.replace(fitted_range={"frequency": (0.0, 0.0)})
+    with pytest.raises(InputError, match="cutoff must be above 0 Hz"):
+        predict(never, recording)

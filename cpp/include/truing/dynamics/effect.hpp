@@ -121,6 +121,7 @@ struct MotionRange {
   Eigen::VectorXd torque;                                    ///< [Nm | N] standard deviation of the measured torque
   std::vector<FrictionTurn> turns;                           ///< of every joint that has a reading
   double duration = 0.0;                                     ///< [s] of the longest recording
+  double frequency = 0.0;                                    ///< [Hz] highest that the low-pass leaves
   std::map<std::string, std::pair<double, double>> columns;  ///< smallest and largest value of the further columns
 };
 

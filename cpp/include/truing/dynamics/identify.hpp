@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,7 @@ struct TorquePrediction {
   Eigen::VectorXd time;     ///< shape=(n,) [s] as recorded
   Eigen::MatrixXd torque;   ///< shape=(n, joints) [Nm | N]
   Eigen::MatrixXd current;  ///< shape=(n, joints) [A] of drives whose torque per ampere is known, else NaN
+  double cutoff = 0.0;      ///< [Hz] of the low-pass that the angles went through for their derivatives
 };
 
 namespace dynamics {
@@ -80,8 +82,9 @@ namespace dynamics {
 TorqueFit identify(const Robot& robot, const std::vector<Recording>& recordings, const TorqueOptions& options = {});
 
 /// Torques of every row of a recording: links, rotors, and the effects that the robot carries. Angles are low-passed at
-/// `cutoff` [Hz] for their derivatives. Throws std::invalid_argument on a recording that cannot be used.
-TorquePrediction predict(const Robot& robot, const Recording& recording, double cutoff = kUsualCutoff,
+/// `cutoff` [Hz] for their derivatives; none: at the highest frequency that the robot's effects were fitted on, or at
+/// kUsualCutoff. Throws std::invalid_argument on a recording that cannot be used.
+TorquePrediction predict(const Robot& robot, const Recording& recording, std::optional<double> cutoff = {},
                          const std::vector<TorqueEffect>& own_effects = {});
 
 }  // namespace dynamics

@@ -89,7 +89,8 @@ struct Robot {
   std::vector<AppliedEffect> effects;  ///< effects with their fitted parameters
   std::optional<Anchor> anchor;        ///< the far end of a draw-wire or ballbar, if there is one
   /// Smallest and largest value of the inputs that the effects were fitted on: 'q1' … [rad | m], 'qd1' … [rad/s | m/s],
-  /// 'payload' [kg], 'temp' [deg C]. Beyond it nobody has seen what they do. Empty: not known.
+  /// 'payload' [kg], 'temp' [deg C], and 'frequency' [Hz] of the motion and torques that effects on torques were fitted
+  /// on. Beyond it nobody has seen what they do. Empty: not known.
   std::map<std::string, std::pair<double, double>> fitted_range;
   /// Effects on the torques of the joints with their parameters, as in `torque_catalogue()`: friction that the file
   /// states, and what `truing::dynamics` found.

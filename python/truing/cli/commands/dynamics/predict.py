@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from truing.cli import run
-from truing.cli.options import File, Frequency, Time, keyword
+from truing.cli.options import File, Frequency, Time
 from truing.cli.recordings import MotionCommand
 from truing.cli.tables import table
 from truing.errors import InputError
@@ -44,9 +44,13 @@ class Command(MotionCommand["tuple[Robot, Recording]", Found]):
         File("One recording of motion, with torques or without.", argument=True, metavar="REC"),
     ]
     cutoff: Annotated[
-        float,
-        Frequency("Of the low-pass that the angles go through for their derivatives.", above=0),
-    ] = keyword("truing.dynamics.api:predict", "cutoff")
+        float | None,
+        Frequency(
+            "Of the low-pass that the angles go through for their derivatives. Default: that of the robot's"
+            " effects, or 8 Hz.",
+            above=0,
+        ),
+    ] = None
     simulate: Annotated[
         float | None,
         Time(
@@ -90,7 +94,6 @@ class Command(MotionCommand["tuple[Robot, Recording]", Found]):
             *loaded,
             found.torques,
             found.response,
-            cutoff=self.cutoff,
             warnings=[*warnings, *([load] if load else [])],
         )
 
