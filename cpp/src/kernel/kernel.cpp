@@ -299,8 +299,19 @@ constexpr int kRows = 4, kCols = 3;  // 12 of 16 registers
 #endif
 constexpr int kBlock = kRows * kCols * kLanes;
 
-// acc += the products of kRows by kCols columns. Not inlined: the sums then stay in registers through the loop.
-__attribute__((noinline)) void block_product(const double* const* a, const double* const* b, int length, double* acc) {
+// Parts of a column's rows, a bit each.
+using Parts = std::uint64_t;
+constexpr int kMostParts = 64, kLeastPart = 16;
+
+// Rows of one part, the last one's but for what is left.
+inline int part_of(int length) { return kLeastPart * (1 + (length - 1) / (kLeastPart * kMostParts)); }
+
+inline Parts all_parts(int length) { return ~Parts{0} >> (kMostParts - 1 - (length - 1) / part_of(length)); }
+
+// acc += the products of kRows by kCols columns over some parts of their rows, one at least. Not inlined: the sums then
+// stay in registers through the loop.
+__attribute__((noinline)) void block_product(const double* const* a, const double* const* b, int length, Parts parts,
+                                             double* acc) {
   Pack sum[kRows][kCols];
   for (int m = 0; m < kRows; ++m)
     for (int n = 0; n < kCols; ++n) sum[m][n] = Pack{};
@@ -308,14 +319,21 @@ __attribute__((noinline)) void block_product(const double* const* a, const doubl
   const double* b0[kCols];
   for (int m = 0; m < kRows; ++m) a0[m] = a[m];
   for (int n = 0; n < kCols; ++n) b0[n] = b[n];
-  for (int k = 0; k < length; k += kLanes) {
-    Pack left[kRows];
-    for (int m = 0; m < kRows; ++m) left[m] = load(a0[m] + k);
-    for (int n = 0; n < kCols; ++n) {
-      const Pack right = load(b0[n] + k);
-      for (int m = 0; m < kRows; ++m) sum[m][n] += left[m] * right;
-    }
-  }
+  const int part = part_of(length);
+  do {
+    int k = __builtin_ctzll(parts) * part;
+    const int end = k + part < length ? k + part : length;
+    do {
+      Pack left[kRows];
+      for (int m = 0; m < kRows; ++m) left[m] = load(a0[m] + k);
+      for (int n = 0; n < kCols; ++n) {
+        const Pack right = load(b0[n] + k);
+        for (int m = 0; m < kRows; ++m) sum[m][n] += left[m] * right;
+      }
+      k += kLanes;
+    } while (k < end);
+    parts &= parts - 1;
+  } while (parts != 0);
   for (int m = 0; m < kRows; ++m)
     for (int n = 0; n < kCols; ++n)
       store(acc + (m * kCols + n) * kLanes, load(acc + (m * kCols + n) * kLanes) + sum[m][n]);
@@ -340,24 +358,44 @@ std::size_t gram_size(int columns) {
   return size;
 }
 
+inline Mask bits_of(const double* x) {
+  Mask out;
+  std::memcpy(&out, x, sizeof out);
+  return out;
+}
+
+// But for the sign.
+inline bool any(Mask bits) {
+  std::int64_t all = 0;
+  for (int l = 0; l < kLanes; ++l) all |= bits[l];
+  return static_cast<std::uint64_t>(all) << 1 != 0;
+}
+
 // So many packs are looked at before anything is decided.
 bool is_zero(const double* x, std::ptrdiff_t length) {
   constexpr int kPacks = 4;
   std::ptrdiff_t k = 0;
   for (; k + kPacks * kLanes <= length; k += kPacks * kLanes) {
     Mask bits{};
-    for (int m = 0; m < kPacks; ++m) {
-      Mask here;
-      std::memcpy(&here, x + k + m * kLanes, sizeof here);
-      bits |= here;
-    }
-    bits <<= 1;  // the sign
-    for (int l = 0; l < kLanes; ++l)
-      if (bits[l] != 0) return false;
+    for (int m = 0; m < kPacks; ++m) bits |= bits_of(x + k + m * kLanes);
+    if (any(bits)) return false;
   }
   for (; k < length; ++k)
     if (x[k] != 0.0) return false;
   return true;
+}
+
+// Where a column is not nought. The first number of most parts tells.
+Parts parts_of(const double* x, int length) {
+  const int part = part_of(length);
+  Parts out = 0;
+  for (int begin = 0, k = 0; begin < length; begin += part, ++k) {
+    const int end = begin + part < length ? begin + part : length;
+    Mask bits{};
+    for (int i = begin; x[begin] == 0.0 && i < end; i += kLanes) bits |= bits_of(x + i);
+    out |= Parts{x[begin] != 0.0 || any(bits)} << k;
+  }
+  return out;
 }
 
 // column(k): where column k is.
@@ -365,22 +403,26 @@ template <typename Column>
 inline void add_products(Column column, int columns, int known, int length, double* acc) {
   // Many columns act now and then only, and what is nought adds nothing.
   constexpr int kMostLooked = 4096;
-  bool zero[kMostLooked] = {};
-  for (int k = 0; k < columns && k < kMostLooked; ++k) zero[k] = is_zero(column(k), length);
-  const auto all_zero = [&](int first, int count) {
-    for (int k = first; k < first + count && k < columns; ++k)
-      if (k >= kMostLooked || !zero[k]) return false;
-    return true;
+  constexpr int kFew = 2 * kCols;  // with so few others it takes longer to look at a column than to take its products
+  const bool meets_many = columns - known > kFew;
+  Parts parts[kMostLooked];
+  for (int k = 0; k < columns && k < kMostLooked; ++k)
+    parts[k] = k >= known || meets_many ? parts_of(column(k), length) : all_parts(length);
+  const auto parts_of_any = [&](int first, int count) {
+    Parts out = 0;
+    for (int k = first; k < first + count && k < columns; ++k) out |= k < kMostLooked ? parts[k] : all_parts(length);
+    return out;
   };
   for_blocks(columns, [&](int i, int j, std::size_t at) {
     if (j + kCols <= known) return;  // above the diagonal all of it is known
-    if (all_zero(i, kRows) || all_zero(j, kCols)) return;
+    const Parts both = parts_of_any(i, kRows) & parts_of_any(j, kCols);
+    if (both == 0) return;
     const double* a[kRows];
     const double* b[kCols];
     // Beyond the last column the last one is read again; gram_reduce leaves those products out.
     for (int m = 0; m < kRows; ++m) a[m] = column(i + m < columns ? i + m : columns - 1);
     for (int n = 0; n < kCols; ++n) b[n] = column(j + n < columns ? j + n : columns - 1);
-    block_product(a, b, length, acc + at);
+    block_product(a, b, length, both, acc + at);
   });
 }
 

@@ -374,6 +374,18 @@ TEST_CASE("every copy of the kernel agrees with the scalar one") {
       for (int i = 0; i <= j; ++i)
         CHECK(placed[j * columns + i] == (is_nought(i) || is_nought(j) ? 0.0 : out[j * columns + i]));
     }
+    // Some of them nought in some rows.
+    std::vector<double> parted(columns * columns, 0.0), by_hand(columns * columns, 0.0);
+    some = c;
+    for (int k = 0; k < columns; ++k) std::fill_n(some.begin() + k * length + 16 * (k % 4), 24 + 8 * (k % 5), 0.0);
+    for (int j = 0; j < columns; ++j)
+      for (int i = 0; i <= j; ++i)
+        for (int k = 0; k < length; ++k) by_hand[j * columns + i] += some[i * length + k] * some[j * length + k];
+    f->gram_add_columns(places.data(), columns, 0, length, acc.data());
+    f->gram_reduce(acc.data(), columns, 0, parted.data());
+    for (int j = 0; j < columns; ++j)
+      for (int i = 0; i <= j; ++i)
+        CHECK(parted[j * columns + i] == doctest::Approx(by_hand[j * columns + i]).scale(1.0).epsilon(1e-13));
     // Rows whose numbers are neighbours, in two lots, some columns of the first nought.
     const int padded = 3 * truing::kernel::kRowColumns, lot = 7;
     std::vector<double> rows(static_cast<std::size_t>(2 * lot * padded), 0.0), sums(padded * padded, -1.0);
