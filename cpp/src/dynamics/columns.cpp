@@ -358,10 +358,18 @@ SumOrder order_of(const TorqueDesign& design, const std::vector<int>& columns, c
   return out;
 }
 
+/// Most products are the earlier ones: those of the other columns take their places among these.
 void add_known(const std::vector<Gram>& earlier, const SumOrder& order, std::vector<Gram>* folds) {
-  const std::vector<Index> known(order.columns.begin(), order.columns.begin() + order.known);
+  const std::vector<Index> others(order.columns.begin() + order.known, order.columns.end() - 1);
   for (std::size_t f = 0; f < folds->size(); ++f) {
-    if ((*folds)[f].xx.size() > 0) (*folds)[f].xx(known, known) = earlier[f].xx(known, known);
+    MatrixXd& sum = (*folds)[f].xx;
+    if (sum.size() == 0) continue;
+    MatrixXd all = earlier[f].xx;
+    for (const Index column : others) {
+      all.col(column) = sum.col(column);
+      all.row(column) = sum.col(column).transpose();
+    }
+    sum = std::move(all);
   }
 }
 
