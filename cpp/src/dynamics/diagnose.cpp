@@ -128,12 +128,18 @@ double squares_of(const Sums& sums, const Fit& fit) {
   return sums.all.yy - 2.0 * fit.values.dot(gram.xy) + fit.values.dot(gram.xx * fit.values);
 }
 
-/// Masses below zero and the like may fit as well as anything, but no robot has them.
-bool bodies_can_do_it(const Problem& problem, const Account& account) {
-  const Evidence::State state = account.search->state(account.choice);
-  const Fit fit = fit_of(*account.sums, state.columns, state.precision);
+/// An account's choice fitted to these sums, of bodies that there can be; with `near` as in with_bodies().
+Fit bodies_fitted(const Problem& problem, const Account& account, const Sums& sums, const Fit* near = nullptr) {
+  const Evidence::State& state = account.search->state(account.choice);
+  const Fit fit = fit_of(sums, state.columns, state.precision);
   std::vector<std::string> said_later;
-  const Fit bodies = with_bodies(problem.robot, *account.design, *account.sums, fit, &said_later);
+  return with_bodies(problem.robot, *account.design, sums, fit, &said_later, near);
+}
+
+/// Masses below zero and the like may fit as well as anything, but no robot has them.
+bool can_do_it(const Account& account, const Fit& bodies) {
+  const Evidence::State& state = account.search->state(account.choice);
+  const Fit fit = fit_of(*account.sums, state.columns, state.precision);
   return squares_of(*account.sums, bodies) <= kOfBodies * squares_of(*account.sums, fit);
 }
 
@@ -172,23 +178,17 @@ bool as_good_as_free(const Account& given, const Account& free) {
   return as_good(simple, flexible) || (nearly && adds_bodies_alone(given, free));
 }
 
-/// Squares of every fold by the fit to the others, of bodies that there can be.
-VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
+/// Squares of every fold by the fit to the others, of bodies that there can be. `to_all`: theirs to all folds.
+VectorXd squares_with_bodies(const Problem& problem, const Account& account, const Fit& to_all) {
   const Evidence::State& state = account.search->state(account.choice);
   const std::vector<FoldGram>& folds = account.sums->folds;
-  const auto fitted = [&](const Sums& sums, const Fit* near) {
-    std::vector<std::string> said_later;
-    const Fit fit = fit_of(sums, state.columns, state.precision);
-    return with_bodies(problem.robot, *account.design, sums, fit, &said_later, near);
-  };
-  const Fit to_all = fitted(*account.sums, nullptr);
   VectorXd out(static_cast<Eigen::Index>(folds.size()));
   const auto fit_without = [&](std::size_t f) {
     const Gram held = folds[f].of(state.columns);
     Sums others{{}, account.sums->all, account.sums->precision};
     others.all.xx(state.columns, state.columns) -= held.xx;
     others.all.xy(state.columns) -= held.xy;
-    const Fit fit = fitted(others, &to_all);
+    const Fit fit = bodies_fitted(problem, account, others, &to_all);
     out[static_cast<Eigen::Index>(f)] = held.yy - 2.0 * fit.values.dot(held.xy) + fit.values.dot(held.xx * fit.values);
   };
   math::for_each_on_threads(folds.size(), problem.tiles.threads(), {}, fit_without, 1);
@@ -197,8 +197,9 @@ VectorXd squares_with_bodies(const Problem& problem, const Account& account) {
 
 /// What was chosen beside the file's inertias, beside inertias that are all free: single links may explain torques only
 /// with masses that no body has, and what else was chosen bends to the nearest that one can have. None where bodies
-/// predict folds as well without.
-std::shared_ptr<const Account> freed(const Problem& problem, const Account& given, double least_gain) {
+/// predict folds as well without. `bodies`: what was chosen, of bodies that there can be.
+std::shared_ptr<const Account> freed(const Problem& problem, const Account& given, const Fit& bodies,
+                                     double least_gain) {
   const TorqueDesign& design = *given.design;
   const int threads = problem.tiles.threads();
   // The sums of given inertias have no priors.
@@ -209,7 +210,8 @@ std::shared_ptr<const Account> freed(const Problem& problem, const Account& give
     out->choice.groups.push_back(given.choice.groups[k]);
     out->choice.scales.push_back(given.choice.scales[k]);
   }
-  const VectorXd before = squares_with_bodies(problem, given), after = squares_with_bodies(problem, *out);
+  const VectorXd before = squares_with_bodies(problem, given, bodies);
+  const VectorXd after = squares_with_bodies(problem, *out, bodies_fitted(problem, *out, *out->sums));
   if (!Search::gains_on_folds(before, after, least_gain / given.search->joints())) return {};
   return out;
 }
@@ -242,8 +244,9 @@ std::optional<Account> of_given_inertias(const Problem& problem, const DesignCol
   }
   leave_out_what_hides(&out);
   if (!as_good_as_free(out, free)) return {};
-  if (!bodies_can_do_it(problem, out)) return {};
-  out.freed = freed(problem, out, limits.least_gain);
+  const Fit bodies = bodies_fitted(problem, out, *out.sums);
+  if (!can_do_it(out, bodies)) return {};
+  out.freed = freed(problem, out, bodies, limits.least_gain);
   out.held_out = held_out_of(problem, out, model, noise);
   return out;
 }
