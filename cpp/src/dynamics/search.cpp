@@ -195,7 +195,7 @@ std::vector<bool> Search::idle_flights(const Choice& choice) const {
 const VectorXd& Search::squares_of_folds(const Choice& choice) const {
   Look& seen = look(choice);
   const std::lock_guard<std::mutex> one(asking_);
-  if (seen.squares.size() == 0) fill_squares({&seen}, 1);
+  if (seen.squares.size() == 0) fill_squares({&seen}, threads_);
   return seen.squares;
 }
 
@@ -280,10 +280,16 @@ Choice Search::in_best_form(const Choice& choice, std::size_t at, const SearchLi
 }
 
 Choice Search::better_forms(Choice choice, const SearchLimits& limits) const {
+  std::vector<std::size_t> with_forms;
+  std::vector<Choice> less_one;  // as long as no form becomes another
   for (std::size_t at = 0; at < choice.groups.size(); ++at) {
     const TorqueGroup& mine = design_.groups[static_cast<std::size_t>(choice.groups[at])];
-    if (mine.forms > 1 && !mine.effect.empty()) choice = in_best_form(choice, at, limits);
+    if (mine.forms < 2 || mine.effect.empty()) continue;
+    with_forms.push_back(at);
+    less_one.push_back(without(choice, at));
   }
+  look_ahead(less_one, Ahead::state);
+  for (const std::size_t at : with_forms) choice = in_best_form(choice, at, limits);
   return choice;
 }
 
