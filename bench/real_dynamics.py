@@ -22,6 +22,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import dynamics_ends as ends
 import dynamics_peers as peers
 import numpy as np
 from numpy.typing import NDArray
@@ -143,6 +144,16 @@ def unknown(found: TorqueDiagnosis) -> str:
     return f" Unknown: {', '.join(said)}." if said else ""
 
 
+def waves(found: TorqueDiagnosis) -> str:
+    """What is left and repeats many times a turn, in words; "" for nothing."""
+    said = [
+        f"{o.order:g} a turn of {o.joint}{' with the direction of motion' if o.with_direction else ''}"
+        f" ({o.amplitude:.2f} Nm, {100 * o.share:.1f} % of what is left there)"
+        for o in found.orders
+    ]
+    return f" Waves that are left: {', '.join(said)}." if said else ""
+
+
 def processor_seconds() -> float:
     """Of this process and those that it has waited for: other work on the machine does not count."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -225,6 +236,27 @@ def fewer_rows(folder: Path) -> list[str]:
     return [*lines, ""]
 
 
+def without_ends(folder: Path) -> list[str]:
+    """What was fitted to the fewer recordings, judged where no recording begins or ends."""
+    lines = [f"**UR10e, without the first and last {ends.END:g} s of each recording**, the same fit", ""]
+    lines += ["| held out | the URDF | standard practice, fitted to such rows | named |"]
+    lines += ["| --- | --- | --- | --- |"]
+    for held_out in USUAL_TESTS:
+        arm = ur10e(folder, held_out, left_out=ONE_JOINT_AT_A_TIME)
+        robot = diagnose(arm.robot, arm.recordings, cutoff=arm.cutoff).robot
+        fitted, tested = (
+            ends.rows_without_ends(
+                arm.urdf, robot, [one for one in arm.recordings if one.test == test], arm.cutoff
+            )
+            for test in (False, True)
+        )
+        models = (tested.nominal, ends.standard_practice(fitted, tested), tested.named)
+        errors = [ends.percent(model, tested.measured) for model in models]
+        shown = " | ".join(" ".join(f"{one:.1f}" for one in joints) for joints in errors)
+        lines.append(f"| {' + '.join(held_out)} | {shown} |")
+    return [*lines, ""]
+
+
 def fitted_rows(arm: Arm) -> int:
     return sum(len(one.time) for one in arm.recordings if not one.test)
 
@@ -270,7 +302,7 @@ def report(data: Path, program: Path | None, figaroh: Path | None) -> list[str]:
     lines: list[str] = []
     for number, arm in enumerate(arms(data)):
         found, table = compared(arm, program, figaroh)
-        lines += [*table, "", f"Named: {causes(found)}.{unknown(found)}", ""]
+        lines += [*table, "", f"Named: {causes(found)}.{unknown(found)}{waves(found)}", ""]
         print("\n".join(lines[-len(table) - 3 :]), flush=True)
         file = data / "dyn_ur10e" / "h14_50s_load.csv"
         if number == 0:
@@ -282,7 +314,8 @@ def report(data: Path, program: Path | None, figaroh: Path | None) -> list[str]:
         if len(arm.recordings) == 1:
             lines += splits(arm)
     if (data / "dyn_ur10e").exists():
-        more = [*fewer_rows(data / "dyn_ur10e"), *seconds_of(data / "dyn_ur10e")]
+        folder = data / "dyn_ur10e"
+        more = [*fewer_rows(folder), *without_ends(folder), *seconds_of(folder)]
         print("\n".join(more), flush=True)
         lines += more
     return lines
