@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 import truing
 from truing._core import TorqueOrder
-from truing.dynamics import Recording, TorqueDiagnosis, diagnose, load_recordings
+from truing.dynamics import (
+    Recording,
+    TorqueDiagnosis,
+    TorqueEffect,
+    diagnose,
+    identify,
+    load_recordings,
+)
 from truing.dynamics.page import orders_sentence
 from truing.dynamics.result import diagnosis_dict
 from truing.testing.dynamics import HIDDEN, simulate_motion
@@ -51,6 +58,22 @@ def test_waves_of_a_gear_are_found_with_their_size(
     assert one.with_direction == directed
     assert one.amplitude == pytest.approx(amplitude, rel=0.25)
     assert 0.05 < one.share < 1.0
+
+
+def test_waves_that_are_left_are_fitted_as_an_effect_of_one_s_own() -> None:
+    simulated = simulate_motion(seed=21, hidden={})
+    waved = [with_waves(r, 0, 32.0, 0.8, directed=True) for r in simulated.recordings]
+    gear = TorqueEffect(
+        "gear",
+        "J1",
+        {
+            "sin": lambda m: m.direction("J1") * np.sin(32 * m.joint("J1")),
+            "cos": lambda m: m.direction("J1") * np.cos(32 * m.joint("J1")),
+        },
+    )
+    fit = identify(simulated.nominal, waved, effects=["coulomb,viscous", gear])
+    values = {p.name: p.value for p in fit.parameters}
+    assert np.hypot(values["gear.J1.sin"], values["gear.J1.cos"]) == pytest.approx(0.8, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
