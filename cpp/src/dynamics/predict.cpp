@@ -44,9 +44,9 @@ double fitted_cutoff(const Robot& robot) {
 
 TorquePrediction predict(const Robot& robot, const Recording& recording, std::optional<double> given,
                          const std::vector<TorqueEffect>& own_effects) {
+  validate(robot);
   const double cutoff = given ? *given : fitted_cutoff(robot);
   if (!(cutoff > 0.0) || !std::isfinite(cutoff)) throw std::invalid_argument("cutoff must be above 0 Hz");
-  validate(robot);
   validate(recording, robot);
   if (recording.read)
     throw std::invalid_argument("recording '" + recording.name +

@@ -309,6 +309,8 @@ void validate(const Robot& robot) {
   for (const auto& [name, ends] : robot.fitted_range) {
     if (!(std::isfinite(ends.first) && std::isfinite(ends.second) && ends.first <= ends.second))
       refuse(where, "fitted_range of '" + name + "' is not a smallest and a largest value");
+    if (name == "frequency" && !(ends.second > 0.0))
+      refuse(where, "fitted_range of 'frequency' ends at " + math::number(ends.second) + " Hz, expected above 0 Hz");
     if (!is_input(name, robot))
       refuse(where, "fitted_range has '" + name + "', expected q1 ..., qd1 ..., payload, temp or frequency");
   }

@@ -266,6 +266,8 @@ TEST_CASE("validate refuses ranges that are none, and of what is no input") {
   CHECK(contains(complaint(robot), "fitted_range of 'q1'"));
   robot.fitted_range["q1"] = {0.0, std::numeric_limits<double>::infinity()};
   CHECK(contains(complaint(robot), "fitted_range of 'q1'"));
+  robot.fitted_range = {{"frequency", {0.0, 0.0}}};
+  CHECK(contains(complaint(robot), "fitted_range of 'frequency' ends at 0"));
   robot.fitted_range = {{"q99", {0.0, 1.0}}};
   CHECK(contains(complaint(robot), "fitted_range has 'q99'"));
   robot.fitted_range = {{"qd99", {0.0, 1.0}}};

@@ -313,6 +313,5 @@ def test_predict_low_passes_where_the_robot_was_fitted(simulated: SimulatedMotio
     assert (predicted.torque == predict(robot, recording, cutoff=12.0).torque).all()
     assert predict(robot, recording, cutoff=5.0).cutoff == 5.0
     assert predict(simulated.nominal, recording).cutoff == 8.0
-    never = robot.replace(fitted_range={"frequency": (0.0, 0.0)})
-    with pytest.raises(InputError, match="cutoff must be above 0 Hz"):
-        predict(never, recording)
+    with pytest.raises(InputError, match="'frequency' ends at 0 Hz, expected above 0 Hz"):
+        predict(robot.replace(fitted_range={"frequency": (0.0, 0.0)}), recording)
