@@ -34,9 +34,9 @@ class Rows:
     """Rows of some recordings."""
 
     measured: Floats  # shape=(rows, joints) [Nm]
-    nominal: Floats  # of the URDF
+    nominal: Floats  # the same of the URDF
     named: Floats  # of the robot found
-    columns: Floats  # of standard practice, shape=(rows, joints, parameters)
+    columns: Floats  # of standard practice for parameters of one, shape=(rows, joints, parameters)
 
 
 def rows_without_ends(urdf: Path, found: Robot, recordings: Sequence[Recording], cutoff: float) -> Rows:
@@ -80,7 +80,9 @@ def _at_own_joint(table: Floats) -> Floats:
 
 
 def standard_practice(fitted: Rows, tested: Rows) -> Floats:
-    """Base parameters, Coulomb, viscous, offset; each joint weighted by its error. Torques of `tested`."""
+    """Base parameters, Coulomb, viscous, offset, each joint weighted by its error (Gautier 1997): torques of
+    `tested`, shape=(rows, joints) [Nm].
+    """
     weight = np.ones(fitted.measured.shape[1])
     for _ in range(ROUNDS):
         gram = np.einsum("j,ija,ijb->ab", weight, fitted.columns, fitted.columns, optimize=True)
@@ -90,8 +92,3 @@ def standard_practice(fitted: Rows, tested: Rows) -> Floats:
         values /= scale
         weight = 1.0 / np.mean((fitted.columns @ values - fitted.measured) ** 2, axis=0)
     return np.asarray(tested.columns @ values)
-
-
-def percent(predicted: Floats, measured: Floats) -> Floats:
-    """Rms error of each joint, in % of the standard deviation of its torque."""
-    return np.asarray(100.0 * np.sqrt(np.mean((predicted - measured) ** 2, axis=0)) / measured.std(axis=0))

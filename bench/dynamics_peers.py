@@ -31,6 +31,11 @@ class NotInstalledError(Exception):
     """A peer that is not there, and why."""
 
 
+def percent(predicted: Floats, measured: Floats) -> Floats:
+    """Rms error of each joint, in % of the standard deviation of its torque. shape=(rows, joints) [Nm | N]"""
+    return np.asarray(100.0 * np.sqrt(np.mean((predicted - measured) ** 2, axis=0)) / measured.std(axis=0))
+
+
 @dataclass(frozen=True)
 class Column:
     """A parameter's torque at one joint."""
@@ -59,10 +64,9 @@ class Rows:
     values: list[Floats]  # of every joint, shape=(rows, its columns), low-passed
 
     def percent(self, predicted: Floats) -> Floats:
-        """Held-out rms error of each joint, in % of the standard deviation of its torque."""
+        """Of held-out rows."""
         held = self.test >= 0
-        error = np.sqrt(np.mean((predicted - self.torque)[held] ** 2, axis=0))
-        return np.asarray(100.0 * error / self.torque[held].std(axis=0))
+        return percent(predicted[held], self.torque[held])
 
 
 def rows_of(

@@ -251,7 +251,7 @@ def without_ends(folder: Path) -> list[str]:
             for test in (False, True)
         )
         models = (tested.nominal, ends.standard_practice(fitted, tested), tested.named)
-        errors = [ends.percent(model, tested.measured) for model in models]
+        errors = [peers.percent(model, tested.measured) for model in models]
         shown = " | ".join(" ".join(f"{one:.1f}" for one in joints) for joints in errors)
         lines.append(f"| {' + '.join(held_out)} | {shown} |")
     return [*lines, ""]

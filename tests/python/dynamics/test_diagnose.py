@@ -233,6 +233,20 @@ def test_the_coupled_wrist_of_a_tx40_is_named_first() -> None:
 
 
 @pytest.mark.realdata
+def test_gears_of_real_arms_are_seen_in_what_is_left() -> None:
+    """A TX40 reduces its first joint by 32, harmonic drives of a UR10e by 101: two waves a motor turn."""
+    folder = real("dyn_tx40")
+    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
+    (first,) = diagnose(robot, load_recordings([folder / "run.csv"], robot), cutoff=20.0).orders
+    assert (first.joint, first.order, first.with_direction) == ("joint_1", 32.0, True)
+    robot, folder = ur10e()
+    orders = diagnose(robot, unloaded(folder, robot)).orders
+    waves = [one.order for one in orders if one.joint == "wrist_1_joint"]
+    assert waves == [pytest.approx(202.0, abs=1.0)]
+    assert all(abs(one.order - 202.0) <= 4.0 or abs(one.order - 101.0) <= 2.0 for one in orders)
+
+
+@pytest.mark.realdata
 def test_friction_chosen_over_another_torque_takes_no_rotor_with_it() -> None:
     """With blocks 2, 4, 7 and 9 held out, load friction of three fifths was fitted to the dry friction of the
     fourth joint; over the torque that it makes itself it leaves more than it found.

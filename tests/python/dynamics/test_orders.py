@@ -4,31 +4,22 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import truing
-from truing._core import TorqueOrder
 from truing.dynamics import (
     Recording,
     TorqueDiagnosis,
     TorqueEffect,
     diagnose,
     identify,
-    load_recordings,
 )
 from truing.dynamics.page import orders_sentence
 from truing.dynamics.result import diagnosis_dict
 from truing.testing.dynamics import HIDDEN, simulate_motion
 
 Floats = NDArray[np.float64]
-
-REAL = Path(os.environ.get("TRUING_REALDATA", ""))
 
 
 def with_waves(one: Recording, joint: int, order: float, amplitude: float, *, directed: bool) -> Recording:
@@ -91,30 +82,3 @@ def test_the_result_and_the_sentence_say_where_and_how_large() -> None:
     assert "J1 80 a turn with the direction of motion (0.4" in orders_sentence([one])
     assert orders_sentence([]) == ""
     assert "left: 80 waves a turn of J1, with the direction" in found.summary()
-
-
-@pytest.mark.realdata
-def test_gears_of_real_arms_are_seen_in_their_torques() -> None:
-    """A TX40 reduces its first joint by 32, harmonic drives of a UR10e by 101: two waves a motor turn."""
-    tx40, cutoff = real("dyn_tx40"), 20.0
-    (first,) = diagnosed_real(tx40, [tx40 / "run.csv"], cutoff)
-    assert (first.joint, first.order, first.with_direction) == ("joint_1", 32.0, True)
-    ur10e = real("dyn_ur10e")
-    orders = diagnosed_real(ur10e, sorted(ur10e.glob("h*0s.csv")), 8.0)
-    waves = [one.order for one in orders if one.joint == "wrist_1_joint"]
-    assert waves == [pytest.approx(202.0, abs=1.0)]
-    assert all(abs(one.order - 202.0) <= 4.0 or abs(one.order - 101.0) <= 2.0 for one in orders)
-
-
-def real(folder: str) -> Path:
-    path = REAL / folder
-    if not os.environ.get("TRUING_REALDATA") or not path.exists():
-        pytest.skip(f"TRUING_REALDATA does not hold {folder}")
-    return path
-
-
-def diagnosed_real(folder: Path, files: list[Path], cutoff: float) -> Sequence[TorqueOrder]:
-    robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
-    for index in robot.driven_joints():
-        robot.joints[index].torque_per_ampere = 10.0  # orders need no units
-    return diagnose(robot, load_recordings(files, robot), cutoff=cutoff).orders
