@@ -75,7 +75,7 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, std::op
     return true;
   });
   TorquePrediction out;
-  out.cutoff = cutoff;
+  out.cutoff = cutoff_of(recordings, cutoff);  // rows that are far apart show less
   out.time = recording.time;
   out.torque.resize(recording.time.size(), static_cast<Index>(robot.driven_count()));
   out.current = MatrixXd::Constant(out.torque.rows(), out.torque.cols(), std::numeric_limits<double>::quiet_NaN());

@@ -313,5 +313,7 @@ def test_predict_low_passes_where_the_robot_was_fitted(simulated: SimulatedMotio
     assert (predicted.torque == predict(robot, recording, cutoff=12.0).torque).all()
     assert predict(robot, recording, cutoff=5.0).cutoff == 5.0
     assert predict(simulated.nominal, recording).cutoff == 8.0
+    slow = Recording("slow", time=recording.time[::4], position=recording.position[::4])
+    assert predict(robot, slow).cutoff == pytest.approx(0.25 / 0.04)  # rows 0.04 s apart show no more
     with pytest.raises(InputError, match="'frequency' ends at 0 Hz, expected above 0 Hz"):
         predict(robot.replace(fitted_range={"frequency": (0.0, 0.0)}), recording)
