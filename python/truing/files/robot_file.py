@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Context, Decimal
@@ -325,7 +326,7 @@ def _from_urdf(path: Path, base_link: str, tip_link: str, any_tool: bool) -> _co
     text = decoded(path, read_bytes(path, _LARGEST_URDF))
     if not text.strip():
         raise InputError(f"{path}: is empty, expected a URDF")
-    if "<xacro:" in text:
+    if "<xacro:" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):  # what xacro wrote may quote its source
         raise InputError(
             f"{path}: is a xacro, expected a URDF: `xacro {path.name} > robot.urdf` (ROS) writes one"
         )

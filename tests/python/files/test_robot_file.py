@@ -712,3 +712,9 @@ def test_a_xacro_is_refused_with_how_it_becomes_a_urdf(tmp_path: Path, name: str
     path.write_text('<robot name="a"><xacro:include filename="b.xacro"/></robot>', encoding="utf-8")
     with pytest.raises(InputError, match=f"is a xacro, expected a URDF: `xacro {name} > robot.urdf`"):
         load_robot(path)
+
+
+def test_what_xacro_wrote_may_quote_its_source(tmp_path: Path) -> None:
+    quoted = '<link name="hand"/>\n<!-- <xacro:gripper\n parent="hand"/> --><!-- written by xacro -->'
+    robot = load_robot(write(tmp_path, URDF.replace('<link name="hand"/>', quoted), "arm.urdf"))
+    assert [joint.name for joint in robot.joints] == ["j1", "j2"]
