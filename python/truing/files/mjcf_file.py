@@ -371,6 +371,11 @@ class _Chain:
             one, two = int(self.m.site_bodyid[one]), int(self.m.site_bodyid[two])
         if self._link_below(one) == self._link_below(two):
             return  # within what is merged into one link
+        for leader, led in ((one, two), (two, one)):
+            if self.m.body_mocapid[leader] >= 0:
+                names = f"{self._body_name(leader)} leads {self._body_name(led)}"
+                self.left_out.append(f"the `{kind}` by which the mocap body {names}: not read")
+                return
         self._refuse(
             f"the equality constraint `{kind}` between {self._body_name(one)} and {self._body_name(two)}"
             " closes a loop: closed chains are not read. Write the passive joint of a parallelogram as"

@@ -288,6 +288,15 @@ def test_a_joint_that_is_held_is_part_of_its_link(tmp_path: Path) -> None:
 # ---- What is refused, what is warned of ----------------------------------------------------------
 
 
+@pytest.mark.parametrize("bodies", ["body1='lead' body2='l2'", "body1='l2' body2='lead'"])
+def test_a_mocap_body_that_leads_the_hand_is_left_out_and_said(tmp_path: Path, bodies: str) -> None:
+    led = JAW.replace("</worldbody>", "<body name='lead' mocap='true'/></worldbody>")
+    led = led.replace("EXTRA", f"<equality><weld {bodies}/></equality>")
+    robot = load(tmp_path, led, tip="l2", warns="mocap body 'lead' leads 'l2': not read")
+    assert driven_names(robot) == ["J1", "J2"]
+    assert_same_torques(JAW.replace("EXTRA", ""), robot)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
