@@ -242,7 +242,8 @@ void free_joints(const Problem& problem, const Rows& rows, const double* q, Acti
   }
 }
 
-/// The step of the free joints, and how long its longest is in radians' worth. False: the damping is too small.
+/// The step of the free joints, and how long its longest turn is [rad]: the tip follows a slide in a straight line
+/// however far it goes. False: the damping is too small.
 bool step_free(const Problem& problem, const Rows& rows, const ActiveSet& set, double damping, double* step,
                double* longest) {
   const int m = rows.count;
@@ -260,7 +261,7 @@ bool step_free(const Problem& problem, const Rows& rows, const ActiveSet& set, d
     double move = 0.0;
     for (int r = 0; r < m; ++r) move += rows.column[j][r] * y[r];
     step[j] = scale[j] * scale[j] * move;
-    *longest = std::max(*longest, std::abs(step[j]) / scale[j]);
+    if (problem.arm.turns(j)) *longest = std::max(*longest, std::abs(step[j]));
   }
   return true;
 }
@@ -303,6 +304,15 @@ bool solve_step(const Problem& problem, const Rows& rows, const double* q, doubl
     return true;
   }
   return true;
+}
+
+/// The cost that may damp: of twice the arm's length and half a turn. What is beyond that is for slides to bring, and
+/// those need no care.
+double far_cost(const Arm& arm) {
+  for (int j = 0; j < arm.driven(); ++j) {
+    if (!arm.turns(j)) return 5.0 * kPi * kPi;
+  }
+  return std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -401,12 +411,13 @@ void descend(const Arm& arm, const Limits& limits, const Scales& scales, const G
   evaluate(problem, q, rows);
   out->converged = rows->small;
   constexpr double kFloor = 1e-14;  // of the damping
+  const double far = far_cost(arm);
   double factor = 0.05;
   int slow = 0;
   while (!out->converged && out->iterations < options.max_iterations) {
     ++out->iterations;
     double step[kMaxDrivenJoints], next[kMaxDrivenJoints];
-    if (!solve_step(problem, *rows, q, factor * rows->cost + kFloor, step)) {
+    if (!solve_step(problem, *rows, q, factor * std::min(rows->cost, far) + kFloor, step)) {
       factor = std::max(10.0 * factor, 1e-3);
       continue;
     }

@@ -74,7 +74,7 @@ struct DescentOptions {
   bool ignore_limits = false;
   int fixed_joints = 0;       ///< so many first joints stay where they are
   int patience = 6;           ///< given up after so many steps in a row that gain less than a tenth
-  double longest_step = 1.0;  ///< of any joint, in radians' worth
+  double longest_step = 1.0;  ///< of any joint that turns [rad]
 };
 
 struct Descent {

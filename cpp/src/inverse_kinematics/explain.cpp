@@ -88,6 +88,7 @@ void explain(const Query& query, Trace* trace, Solution* solution) {
   const double* best = trace->nearest.readings;
   const Excess excess = least_excess(query, best, trace);
   find_alternative(query, best, trace, solution);
+  if (solution->reached()) return;  // what looked for the next best thing found the best
 
   const Tip tip = robot.arm.tip(solution->joints.data(), query.scratch);
   const bool turned_away = solution->position_error <= robot.options.position_tolerance;

@@ -421,6 +421,31 @@ TEST_CASE("a robot of prismatic joints alone is as good as any") {
   CHECK((solution.joints - truth).norm() < 1e-9);
 }
 
+TEST_CASE("a portal reaches across its hall, however short its wrist is") {
+  Robot robot;
+  robot.convention = Convention::urdf;
+  const auto axis = [&robot](const char* name, JointType type, int along, double range) {
+    Joint j;
+    j.name = name;
+    j.type = type;
+    j.axis = Vector3d::Unit(along);
+    j.lower = -range;
+    j.upper = range;
+    robot.joints.push_back(j);
+  };
+  for (int k = 0; k < 3; ++k) axis(k == 0 ? "X" : k == 1 ? "Y" : "Z", JointType::prismatic, k, 20.0);
+  for (int k = 0; k < 3; ++k) axis(k == 0 ? "A" : k == 1 ? "B" : "C", JointType::revolute, k, 3.1);
+  robot.targets = {{"tool", truing::frame_from_xyz_rpy({0.0, 0.0, 0.1}, {0.0, 0.0, 0.0})}};
+  const InverseSolver solver(robot);
+  Sampler sampler(robot, 16);
+  for (int k = 0; k < 300; ++k) {
+    const Task task = task_at(reached(robot, sampler.joints()));
+    const Solution solution = solver.solve(task, sampler.joints());
+    CHECK(solution.reached());
+    CHECK(holds(robot, task, solution));
+  }
+}
+
 TEST_CASE("an arm on a rail that comes to its end keeps its configuration") {
   // Clamping flips it elsewhere: here the error goes to the joints that still can move.
   Robot robot = gantry();
