@@ -312,6 +312,38 @@ def test_real_arms_of_another_convention_are_recognised(folder: str) -> None:
     assert said in finding.evidence
 
 
+def torques_of(robot: truing.Robot, one: Recording) -> Floats:
+    speed = speed_of(one)
+    acceleration = np.gradient(speed, one.time, axis=0)
+    return np.asarray(_core.rigid_torques(robot, one.position, speed, acceleration))
+
+
+def with_load(robot: truing.Robot, mass: float, offset: tuple[float, float, float]) -> truing.Robot:
+    """The robot with a point mass [kg] beside its tool [m]."""
+    heavy = robot.copy()
+    last = heavy.joints[-1]
+    place = np.array(heavy.targets[0].T_last_target)[:3, 3] + offset
+    center = (last.mass * np.asarray(last.center_of_mass) + mass * place) / (last.mass + mass)
+    inertia = np.array(last.inertia)
+    for weight, at in ((last.mass, last.center_of_mass - center), (mass, place - center)):
+        inertia += weight * (at @ at * np.eye(3) - np.outer(at, at))
+    last.mass, last.center_of_mass, last.inertia = last.mass + mass, center, inertia
+    return heavy
+
+
+def test_a_heavy_gripper_that_the_file_lacks_is_no_other_convention() -> None:
+    balanced = ARM.copy()  # its wrist hangs behind: a gripper turns the weight round
+    for joint in balanced.joints[2:]:
+        joint.center_of_mass = -3.0 * np.asarray(joint.center_of_mass)
+    heavy = with_load(balanced, 8.0, (0.0, 0.1, 0.1))
+    recordings = [
+        one.replace(torque=np.asarray(one.torque) + torques_of(heavy, one) - torques_of(ARM, one))
+        for one in MOTIONS
+    ]
+    finding = only(check_recordings(balanced, recordings))
+    assert finding.finding == "gain" and "a load that the model lacks makes more than 1" in finding.evidence
+
+
 # ---- The file of another robot ---------------------------------------------------------------------
 def of_another(robot: truing.Robot, longer: float) -> truing.Robot:
     """A robot of the same kind, whose links are longer and, as they grow with it, heavier."""

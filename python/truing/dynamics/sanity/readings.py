@@ -22,6 +22,7 @@ from truing.dynamics.recorded import driven_joints
 from truing.dynamics.sanity import conventions, gravity
 from truing.dynamics.sanity.findings import RecordingFinding, listed
 from truing.dynamics.sanity.grids import Grid
+from truing.dynamics.sanity.loads import OF_LOAD, REACH
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -35,7 +36,7 @@ GAIN = 0.4  # of a joint's variance: from here on another reading is far better
 PART = 0.5  # and it must leave at most this part of what the joints in question left
 FITS = 0.25  # of the variance: more must not be left of a joint that is read with another sign
 SEEN, SEVERAL = 0.02, 2  # of the variance that a joint left; joints that leave half of it or less
-AS_GOOD = 0.9  # of the gain of another gravity: a force at the tool with more may be all there is
+AS_GOOD = 0.9  # of the gain of another reading: a force or load at the tool with more may be all there is
 FAIR = 0.08  # of the variance: where a joint leaves more, other orders are looked at
 HEAVY = 0.5  # of the variance by rigid torque: there angles are seen in it
 OF_ALL = ("torque_order", "joint_order", "angle_convention", "gravity_removed")  # joints together
@@ -47,6 +48,10 @@ NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes
 BEYOND = 4.0  # times the limit of a joint: no angle is there
 BOTH = 0.05  # of the variance: rigid torque and friction both speak of the sign
 DEPENDENT = 1e-9  # determinant of columns of unit length that say the same
+_SUBSETS = np.array(
+    [one for one in itertools.product((True, False), repeat=3) if any(one)]
+)  # of three columns
+_BOTH_IN = _SUBSETS[:, :, None] & _SUBSETS[:, None, :]
 
 
 @dataclass(frozen=True)
@@ -171,7 +176,20 @@ class _Model:
 
     def left_with_force(self, reading: Reading) -> float:
         """What is left, over all joints, with the constant force at the tool that fits best."""
-        pulls = gravity.held_against(self.robot, self._angles(reading))
+        return self._left_beside(reading, gravity.held_against(self.robot, self._angles(reading)))[0]
+
+    def left_with_load(self, reading: Reading) -> float:
+        """The same with the load at the tool that fits best; infinite where none could hang there."""
+        robot = gravity.under(self.robot, np.array(reading.gravity))
+        motion = self._angles(reading), *(self._read(x, reading) for x in (self.rows.qd, self.rows.qdd))
+        columns = np.asarray(_core.torque_regressor(robot, *motion))[:, :, -10 : -10 + OF_LOAD]
+        left, (mass, *moment) = self._left_beside(reading, columns)
+        tool = np.array(robot.targets[0].T_last_target)[:3, 3] if robot.targets else np.zeros(3)
+        hangs = mass > 0.0 and np.linalg.norm(moment / mass - tool) < REACH
+        return left if hangs else math.inf
+
+    def _left_beside(self, reading: Reading, pulls: Floats) -> tuple[float, Floats]:
+        """What is left, over all joints, with more columns, shape=(n, joints, k), and their factors."""
         sides, torques = [], []
         for j in range(len(reading.order)):
             left, scale, *_ = self._fit_of(reading, j)
@@ -184,8 +202,8 @@ class _Model:
             torques.append(both[:, 0])
             sides.append(both[:, 1:])
         side, torque = np.concatenate(sides), np.concatenate(torques)
-        force = np.linalg.lstsq(side, torque, rcond=None)[0]
-        return float(np.sum((torque - side @ force) ** 2))
+        factors = np.linalg.lstsq(side, torque, rcond=None)[0]
+        return float(np.sum((torque - side @ factors) ** 2)), factors
 
 
 def _without(columns: Floats, values: Floats) -> Floats:
@@ -194,24 +212,16 @@ def _without(columns: Floats, values: Floats) -> Floats:
     return np.asarray(values - x @ np.linalg.lstsq(x, values, rcond=None)[0])
 
 
-def _not_negative(gram: Floats, right: Floats, there: NDArray[np.intp]) -> Floats:
-    """Factors of least squares that are not negative: the best of all subsets of the columns; the whole comes
-    first, as it is the best where its factors are so.
-    """
-    out, most = np.zeros(len(right)), 0.0
-    for subset in (s for n in (3, 2, 1) for s in itertools.combinations(there, n)):
-        some = list(subset)
-        part = gram[np.ix_(some, some)]
-        if np.linalg.det(part) < DEPENDENT:
-            continue
-        found = np.linalg.solve(part, right[some])
-        explained = float(found @ right[some])
-        if explained > most and (found >= 0.0).all():
-            out, most = np.zeros(len(right)), explained
-            out[some] = found
-            if len(some) == len(there):
-                break
-    return out
+def _not_negative(gram: Floats, right: Floats) -> Floats:
+    """Factors of least squares that are not negative: the best of all subsets of the three columns."""
+    parts = np.where(_BOTH_IN, gram, np.eye(3))
+    able = np.linalg.det(parts) >= DEPENDENT
+    if not able.any():
+        return np.zeros(3)
+    factors = np.linalg.solve(parts[able], (_SUBSETS * right)[able][:, :, None])[:, :, 0]
+    explained = np.where((factors >= 0.0).all(axis=1), factors @ right, 0.0)
+    best = int(np.argmax(explained))
+    return np.asarray(factors[best] if explained[best] > 0.0 else np.zeros(3))
 
 
 def _fit_joint(columns: Floats, torque: Floats) -> tuple[float, ...]:
@@ -228,7 +238,7 @@ def _fit_joint(columns: Floats, torque: Floats) -> tuple[float, ...]:
     if not total > 0.0:
         return nothing
     x = x / np.where(size > 0.0, size, 1.0)
-    factors = _not_negative(x.T @ x, x.T @ y, np.flatnonzero(size > 0.0))
+    factors = _not_negative(x.T @ x, x.T @ y)
     left = float(np.sum((y - x @ factors) ** 2))
     friction = x[:, 1:] @ factors[1:]
     scale = factors[0] / size[0] if size[0] > 0.0 else 0.0
@@ -272,8 +282,7 @@ def _downs(model: _Model, reading: Reading) -> Iterator[_Candidate]:
         return float(np.nan_to_num(model.fit(one).left, nan=0.0).sum())
 
     down = read(gravity.best_direction(lambda direction: left(read(direction))))
-    as_it_is = left(reading)
-    if as_it_is - model.left_with_force(reading) < AS_GOOD * (as_it_is - left(down)):
+    if not _is_as_good_as(model.left_with_force(reading), model.fit(reading), model.fit(down)):
         yield _Candidate("gravity_direction", (), down)
     yield _Candidate("gravity_removed", (), read(np.zeros(3)))
 
@@ -367,6 +376,11 @@ def better_reading(
     fit = model.fit(reading)
     found: list[_Found] = []
     while len(found) < 2 * len(joints):
+        with_load = model.left_with_load(reading) if np.any(fit.left > seen) else math.inf
+        if with_load < (1.0 - AS_GOOD) * np.nansum(
+            fit.left
+        ):  # a gripper that the file lacks: no reading gains more
+            break
         poor = [int(j) for j in np.flatnonzero(fit.left > POOR)]
         candidates = list(_candidates(reading, revolute, poor)) if poor else []
         if np.any(fit.left > seen):
@@ -382,6 +396,7 @@ def better_reading(
             for gain in (_gain(fit, other, candidate),)
             if gain > 0.0
         ]
+        tried = [one for one in tried if not _is_as_good_as(with_load, fit, one[2])]
         if not tried:
             break
         candidate, other, rival = _chosen(tried)
@@ -432,6 +447,12 @@ def _as_good(rival: Fit, best: Fit) -> bool:
     most of the torques was unexplained, a reading that explains four fifths has gained nearly as much.
     """
     return not bool((rival.left > AS_LITTLE * np.maximum(best.left, SEEN)).any())
+
+
+def _is_as_good_as(left: float, fit: Fit, other: Fit) -> bool:
+    """Whether what leaves so much over all joints gains nearly as much as another reading."""
+    as_it_is = float(np.nansum(fit.left))
+    return as_it_is - left >= AS_GOOD * (as_it_is - float(np.nansum(other.left)))
 
 
 def _alike(one: _Candidate, other: _Candidate) -> bool:
