@@ -306,8 +306,8 @@ bool solve_step(const Problem& problem, const Rows& rows, const double* q, doubl
   return true;
 }
 
-/// The cost that may damp: of twice the arm's length and half a turn. What is beyond that is for slides to bring, and
-/// those need no care.
+/// The cost that may damp: of twice the arm's length, which counts as pi (Scales), and half a turn: (2 pi)^2 + pi^2.
+/// What is beyond that is for slides to bring, and those need no care.
 double far_cost(const Arm& arm) {
   for (int j = 0; j < arm.driven(); ++j) {
     if (!arm.turns(j)) return 5.0 * kPi * kPi;

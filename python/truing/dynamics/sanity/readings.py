@@ -183,9 +183,9 @@ class _Model:
         robot = gravity.under(self.robot, np.array(reading.gravity))
         motion = self._angles(reading), *(self._read(x, reading) for x in (self.rows.qd, self.rows.qdd))
         columns = np.asarray(_core.torque_regressor(robot, *motion))[:, :, -10 : -10 + OF_LOAD]
-        left, (mass, *moment) = self._left_beside(reading, columns)
+        left, load = self._left_beside(reading, columns)
         tool = np.array(robot.targets[0].T_last_target)[:3, 3] if robot.targets else np.zeros(3)
-        hangs = mass > 0.0 and np.linalg.norm(moment / mass - tool) < REACH
+        hangs = load[0] > 0.0 and np.linalg.norm(load[1:] / load[0] - tool) < REACH
         return left if hangs else math.inf
 
     def _left_beside(self, reading: Reading, pulls: Floats) -> tuple[float, Floats]:
@@ -282,7 +282,7 @@ def _downs(model: _Model, reading: Reading) -> Iterator[_Candidate]:
         return float(np.nan_to_num(model.fit(one).left, nan=0.0).sum())
 
     down = read(gravity.best_direction(lambda direction: left(read(direction))))
-    if not _is_as_good_as(model.left_with_force(reading), model.fit(reading), model.fit(down)):
+    if not _gains_as_much(model.left_with_force(reading), model.fit(reading), model.fit(down)):
         yield _Candidate("gravity_direction", (), down)
     yield _Candidate("gravity_removed", (), read(np.zeros(3)))
 
@@ -377,10 +377,8 @@ def better_reading(
     found: list[_Found] = []
     while len(found) < 2 * len(joints):
         with_load = model.left_with_load(reading) if np.any(fit.left > seen) else math.inf
-        if with_load < (1.0 - AS_GOOD) * np.nansum(
-            fit.left
-        ):  # a gripper that the file lacks: no reading gains more
-            break
+        if with_load < (1.0 - AS_GOOD) * float(np.nansum(fit.left)):
+            break  # a gripper that the file lacks: no reading gains more
         poor = [int(j) for j in np.flatnonzero(fit.left > POOR)]
         candidates = list(_candidates(reading, revolute, poor)) if poor else []
         if np.any(fit.left > seen):
@@ -396,7 +394,7 @@ def better_reading(
             for gain in (_gain(fit, other, candidate),)
             if gain > 0.0
         ]
-        tried = [one for one in tried if not _is_as_good_as(with_load, fit, one[2])]
+        tried = [one for one in tried if not _gains_as_much(with_load, fit, one[2])]
         if not tried:
             break
         candidate, other, rival = _chosen(tried)
@@ -449,7 +447,7 @@ def _as_good(rival: Fit, best: Fit) -> bool:
     return not bool((rival.left > AS_LITTLE * np.maximum(best.left, SEEN)).any())
 
 
-def _is_as_good_as(left: float, fit: Fit, other: Fit) -> bool:
+def _gains_as_much(left: float, fit: Fit, other: Fit) -> bool:
     """Whether what leaves so much over all joints gains nearly as much as another reading."""
     as_it_is = float(np.nansum(fit.left))
     return as_it_is - left >= AS_GOOD * (as_it_is - float(np.nansum(other.left)))
