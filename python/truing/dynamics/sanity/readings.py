@@ -202,7 +202,7 @@ class _Model:
             torques.append(both[:, 0])
             sides.append(both[:, 1:])
         side, torque = np.concatenate(sides), np.concatenate(torques)
-        factors = np.linalg.lstsq(side, torque, rcond=None)[0]
+        factors = np.asarray(np.linalg.lstsq(side, torque, rcond=None)[0], dtype=np.float64)
         return float(np.sum((torque - side @ factors) ** 2)), factors
 
 
