@@ -171,6 +171,9 @@ double noise_against_priors(const Equations& equations, const Equations& all, co
   return noise_of(job, without_priors.fitted, all.norms(without_priors));
 }
 
+constexpr int kRobustRounds = 10;
+constexpr double kSettled = 1e-3;  // of the scale
+
 /// A robust loss at a scale of the residuals' own, until that has settled.
 void robust_rounds(const Equations& all, const Job& job, Loss loss, int rounds, double settled, Fit* out) {
   for (int round = 0; round < rounds; ++round) {
@@ -215,7 +218,7 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   first.solve(&out);
   if (job.options.loss == Loss::none) return out;
   if (job.options.loss != Loss::reject) {
-    robust_rounds(all, job, job.options.loss, 10, 1e-3, &out);
+    robust_rounds(all, job, job.options.loss, kRobustRounds, kSettled, &out);
     return out;
   }
   if (gross_outliers(job, all.norms(out), job.options.reject_beyond).empty()) {
@@ -226,6 +229,21 @@ Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& s
   out.weighing.loss = RowLoss::none;
   rejecting_rounds(all, job, &out);
   return out;
+}
+
+Fit descended(const Job& job, const Fit& like, const Eigen::VectorXd& place) {
+  Fit out = like;
+  out.values = place;
+  out.solver.iterations = 0;
+  Equations(job, out.fitted, without(job.rows, out.rejected)).solve(&out);
+  return out;
+}
+
+Fit settled(const Job& job, Fit found) {
+  const Equations all(job, found.fitted, job.rows);
+  if (job.options.loss == Loss::reject) rejecting_rounds(all, job, &found);
+  if (found.weighing.loss != RowLoss::none) robust_rounds(all, job, job.options.loss, kRobustRounds, kSettled, &found);
+  return found;
 }
 
 double noise_of(const Job& job, const Fit& found) {

@@ -52,8 +52,15 @@ Prior prior_of(const Job& job, const std::vector<int>& fitted, double noise);
 /// gross outliers found and left out.
 Fit fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start);
 
-/// The fit in the deepest of its hollows. Nobody looks for others where priors or bounds hold what is hardly seen.
-Fit deepest_fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start);
+/// Where the rows and the loss that a fit ended with lead from another place.
+Fit descended(const Job& job, const Fit& like, const Eigen::VectorXd& place);
+
+/// A fit whose gross outliers, or scale of the loss, are found anew until they stay.
+Fit settled(const Job& job, Fit found);
+
+/// The fit in the deepest of the hollows about one that was found. Nobody looks for others where priors or bounds hold
+/// what is hardly seen.
+Fit deepest_from(const Job& job, Fit found);
 
 /// Noise of a unit-weight component, from the median row of a fit; NaN: no more values than parameters.
 double noise_of(const Job& job, const Fit& found);

@@ -114,21 +114,21 @@ std::optional<Fit> deeper_fit(const Job& job, const Fit& here) {
   double least = depth.here() * (1.0 - kDeeper / static_cast<double>(depth.values()));
   std::optional<Fit> deepest;
   for (const Eigen::VectorXd& place : places) {
-    Fit other = fit(job, here.fitted, place);
+    Fit other = descended(job, here, place);
     const double squares = depth.at(other);
     if (!(squares < least)) continue;
     least = squares;
     deepest = std::move(other);
   }
+  if (deepest) deepest = settled(job, std::move(*deepest));
   return deepest;
 }
 
 }  // namespace
 
-Fit deepest_fit(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start) {
+Fit deepest_from(const Job& job, Fit best) {
   constexpr int kMostRounds = 3;
   constexpr int kMostSteps = 1000;
-  Fit best = fit(job, fitted, start);
   if (!best.solver.converged || !job.options.priors.empty() || !job.options.bounds.empty()) return best;
   IdentifyOptions options = job.options;
   options.max_iterations = std::min(options.max_iterations, kMostSteps);
@@ -136,9 +136,9 @@ Fit deepest_fit(const Job& job, const std::vector<int>& fitted, const Eigen::Vec
   const bool all = some.rows.size() == job.rows.size();
   for (int round = 0; round < kMostRounds; ++round) {
     if (!all && beyond_bends(job, best).empty()) break;
-    const std::optional<Fit> deeper = deeper_fit(some, all ? best : fit(some, fitted, best.values));
+    const std::optional<Fit> deeper = deeper_fit(some, all ? best : fit(some, best.fitted, best.values));
     if (!deeper) break;
-    Fit other = all && deeper->solver.converged ? *deeper : fit(job, fitted, deeper->values);
+    Fit other = all && deeper->solver.converged ? *deeper : fit(job, best.fitted, deeper->values);
     if (!all && !(Depth(job, best).at(other) < Depth(job, best).here())) break;
     best = std::move(other);
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "identification/asked.hpp"
 #include "identification/report.hpp"
@@ -45,13 +46,11 @@ bool IdentifyOptions::is_valid(std::string* error) const {
 namespace identification {
 namespace {
 
-/// The fit; gravity torques are taken from the robot as found until they no longer change. `bases` are the job's.
-Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen::VectorXd& start,
-                     std::vector<std::vector<double>>* bases) {
+/// A fit; gravity torques are taken from the robot as found until they no longer change. `bases` are the job's.
+Fit with_gravity(const Job& job, Fit found, std::vector<std::vector<double>>* bases) {
   constexpr int kRounds = 5;
   constexpr double kUnchanged = 1e-11;
   const auto needs_gravity = [](const Term& term) { return term.needs_gravity; };
-  Fit found = deepest_fit(job, fitted, start);
   if (!std::any_of(job.model.terms.begin(), job.model.terms.end(), needs_gravity)) return found;
   for (int round = 0; round < kRounds; ++round) {
     const Robot robot = robot_with(job.model, found.values);
@@ -60,35 +59,43 @@ Fit fit_with_gravity(const Job& job, const std::vector<int>& fitted, const Eigen
       break;  // a length that was none: the law stays with the drawing's
     *bases = make_bases(found_model, job.data);
     const Eigen::VectorXd before = found.values;
-    found = fit(job, fitted, before);
+    found = fit(job, found.fitted, before);
     if ((found.values - before).cwiseAbs().maxCoeff() < kUnchanged) break;
   }
   return found;
 }
 
-/// The fit anew, its links near the nominal robot: under a prior of a size that the rows choose, until it stays. Gives
-/// the size. Where links are farther off than robots are, the nominal robot tells nothing of them but where to start
-/// from: the fit is free, in one of the hollows that are near.
-double shrink(const Job& job, const Eigen::VectorXd& start, std::vector<std::vector<double>>* bases, Fit* found) {
+/// A fit whose links are near the nominal robot, and about how far off it they are.
+struct NearNominal {
+  Fit fit;
+  double size = 0.0;  ///< [rad, m]
+};
+
+/// A fit anew, its links near the nominal robot: under a prior of a size that the rows choose, until it stays. Where
+/// links are farther off than robots are, the nominal robot tells nothing of them but where to start from: the fit is
+/// free, in one of the hollows that are near.
+NearNominal shrunk(const Job& job, const Fit& found, const Eigen::VectorXd& start,
+                   std::vector<std::vector<double>>* bases) {
   constexpr double kFirst = 0.01;  // [rad, m]
   constexpr int kRounds = 5;
-  const std::vector<int> fitted = found->fitted, links = links_of(job.model, fitted);
+  const std::vector<int> links = links_of(job.model, found.fitted);
   IdentifyOptions options = job.options;
-  options.prior_noise = noise_of(job, *found);
+  options.prior_noise = noise_of(job, found);
   const Job near_nominal{job.model, job.data, job.bases, options, job.rows};
-  double size = 0.0, next = kFirst;
-  for (int round = 0; round < kRounds && next != size; ++round) {
-    size = next;
-    for (const int k : links) options.priors[job.model.parameters[fitted[k]].name] = size;
+  NearNominal out;
+  double next = kFirst;
+  for (int round = 0; round < kRounds && next != out.size && out.size <= kFarOff; ++round) {
+    out.size = next;
+    for (const int k : links) options.priors[job.model.parameters[found.fitted[k]].name] = out.size;
     *bases = make_bases(job.model, job.data);
-    *found = fit_with_gravity(near_nominal, fitted, start, bases);
-    next = likeliest_error(near_nominal, *found, links);
+    out.fit = with_gravity(near_nominal, fit(near_nominal, found.fitted, start), bases);
+    next = likeliest_error(near_nominal, out.fit, links);
   }
-  if (size <= kFarOff) return size;
+  if (out.size <= kFarOff) return out;
   *bases = make_bases(job.model, job.data);
-  *found = fit_with_gravity(job, fitted, Eigen::VectorXd(found->values), bases);
-  unwind(job.model, links, found);
-  return size;
+  out.fit = with_gravity(job, deepest_from(job, fit(job, found.fitted, out.fit.values)), bases);
+  unwind(job.model, links, &out.fit);
+  return out;
 }
 
 }  // namespace
@@ -113,13 +120,25 @@ Identification identify(const Robot& nominal, const Measurements& data, const Id
   if (model.terms.size() != nominal_model.terms.size()) bases = make_bases(model, data);
   const Job job{model, data, bases, options, rows.train};
   const Seen seen = what_is_seen(job, asked, start.values);
-  Fit found = fit_with_gravity(job, seen.selection.fitted, start.values, &bases);
+  Fit found = fit(job, seen.selection.fitted, start.values);
   Uncertainty known = uncertainty(job, found, rows.pose, asked.content.poses);
-  double off = 0.0;  // about as far as links are; 0: nobody asks
-  if (options.priors.empty() && options.bounds.empty() &&
-      barely_seen(links_of(model, found.fitted), known.covariance, options.shrink_beyond)) {
-    off = shrink(job, start.values, &bases, &found);
+  const auto take = [&](Fit other) {
+    found = std::move(other);
     known = uncertainty(job, found, rows.pose, asked.content.poses);
+  };
+  const auto links_are_barely_seen = [&] {
+    return options.priors.empty() && options.bounds.empty() &&
+           barely_seen(links_of(model, found.fitted), known.covariance, options.shrink_beyond);
+  };
+  if (!links_are_barely_seen()) {
+    Fit deepest = with_gravity(job, deepest_from(job, found), &bases);
+    if (deepest.values != found.values) take(std::move(deepest));
+  }
+  double off = 0.0;  // about as far as links are; 0: nobody asks
+  if (links_are_barely_seen()) {
+    NearNominal near = shrunk(job, found, start.values, &bases);
+    off = near.size;
+    take(std::move(near.fit));
   }
 
   Identification result;
