@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """Where another program says that the camera is: results of easy_handeye, easy_handeye2, MoveIt,
-cv::calibrateHandEye and of ``truing handeye``, told by what stands in the file.
+cv::calibrateHandEye, ViSP and of ``truing handeye``, told by what stands in the file.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from truing.files.common import decoded, listed, read_bytes
 from truing.files.opencv_file import read_opencv_camera_frame
 from truing.files.other_poses import Setup, read_other_poses
 from truing.files.rigid import frames_from_quaternions
+from truing.files.visp_file import visp_frame
 from truing.files.yaml_tree import Document, found
 
 Floats = NDArray[np.float64]
@@ -33,7 +34,8 @@ _NUMBERS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _MOUNTS: dict[str, Setup] = {"EYE-IN-HAND": "eye-in-hand", "EYE-TO-HAND": "eye-to-hand"}
 _EXPECTED = (
     "the result of easy_handeye, easy_handeye2 (.calib), MoveIt (a launch file), OpenCV (R_cam2gripper,"
-    " t_cam2gripper; R_cam2base, t_cam2base), truing handeye (result.json), or one 4 x 4 matrix"
+    " t_cam2gripper; R_cam2base, t_cam2base), ViSP (eMc.yaml), truing handeye (result.json), or one 4 x 4"
+    " matrix"
 )
 
 
@@ -60,6 +62,10 @@ def read_handeye_answer(path: Path) -> HandEyeAnswer:
         return HandEyeAnswer(path, "matrices of OpenCV", setup, T)
     if re.match(r"(---|#|\w+:)", start) and re.search(r"^transform(ation)?:", text, re.MULTILINE):
         return _of_easy_handeye(path)
+    if re.match(r"(---|#|\w+:)", start) and re.search(r"^rows:", text, re.MULTILINE):
+        return HandEyeAnswer(
+            path, "the result of ViSP", None, visp_frame(Document.read(path, "result of ViSP"))
+        )
     return _of_numbers(path)
 
 

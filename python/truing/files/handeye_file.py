@@ -601,7 +601,7 @@ def load_stream(path: PathLike, side: Side, *, angles: str | None = None) -> Str
     """Read poses with times: t_s and hand_x_m … hand_qz, or board_x_m … board_qz. Columns as in
     `load_handeye`; times increase. Or poses as other programs write them: lines of 16 or 12 numbers and
     matrices of OpenCV, which have no times, lines of 8 (time, position, quaternion x y z w), and CSV exports
-    of the ROS messages PoseStamped and TransformStamped.
+    of the ROS messages PoseStamped and TransformStamped; files of ViSP, as one name with %d for their number.
 
     Raises InputError that names the line, the column, what was found and what was expected.
     """

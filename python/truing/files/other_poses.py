@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 the truing authors
 # SPDX-License-Identifier: BSD-3-Clause
 """Poses as other programs write them: lines of 16, 12 or 8 numbers, CSV exports of ROS messages, samples of
-easy_handeye, easy_handeye2 and MoveIt, matrices of OpenCV, programs of robots.
+easy_handeye, easy_handeye2 and MoveIt, matrices of OpenCV, files of ViSP, programs of robots.
 
 What a file is, is told by what stands in it, not by its name.
 """
@@ -26,6 +26,7 @@ from truing.files.opencv_file import read_opencv_poses
 from truing.files.program_poses import hand_poses, is_program
 from truing.files.rigid import frames_from_quaternions, frames_from_rows
 from truing.files.table import Table
+from truing.files.visp_file import is_series, is_visp_matrix, read_visp_series
 from truing.files.yaml_tree import Document, Loc, found
 
 Floats = NDArray[np.float64]
@@ -79,6 +80,8 @@ def read_other_poses(path: Path, setup: Setup | None = None) -> OtherPoses | Non
     """
     if is_program(path):
         return OtherPoses(path, "a robot program", hand=hand_poses(path))
+    if is_series(path):
+        return OtherPoses(path, "poses of ViSP", either=read_visp_series(path))
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
@@ -267,6 +270,12 @@ def _yaml_poses(path: Path, setup: Setup | None) -> OtherPoses:
     value = document.value
     if isinstance(value, list):
         return _moveit_samples(document)
+    if is_visp_matrix(value):
+        document.refuse(
+            (),
+            "found one pose of ViSP, expected all of them: give the name with %d for the number,"
+            " pose_fPe_%d.yaml, and the poses of the board as --board-poses pose_cPo_%d.yaml",
+        )
     samples = value.get("samples")
     if isinstance(samples, list):
         return _easy_handeye2_samples(document, setup)

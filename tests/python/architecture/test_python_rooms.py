@@ -77,6 +77,7 @@ FLOORS = {
         "tags",
         "boards",
         "opencv_file",
+        "visp_file",
         "program_poses",
         "other_poses",
         "handeye_answer",

@@ -93,7 +93,8 @@ class Command(run.Command[Loaded, "Solved | None"]):
         Path,
         File(
             "Hand poses, and board poses or images, one row per robot pose: CSV or Parquet; or a file of"
-            " easy_handeye, MoveIt, OpenCV, ROS messages or lines of matrices.",
+            " easy_handeye, MoveIt, OpenCV, ROS messages or lines of matrices; or pose_fPe_%d.yaml, the files"
+            " of ViSP.",
             argument=True,
             metavar="POSES",
         ),
@@ -132,7 +133,8 @@ class Command(run.Command[Loaded, "Solved | None"]):
     compare: Annotated[
         Sequence[Path],
         File(
-            "Where another program says that the camera is: result of easy_handeye, MoveIt, OpenCV or truing."
+            "Where another program says that the camera is: result of easy_handeye, MoveIt, OpenCV, ViSP or"
+            " truing."
             " May be repeated.",
             several=True,
         ),
