@@ -125,48 +125,42 @@ class _Model:
 
     def __init__(self, robot: _core.Robot, rows: Rows) -> None:
         self.robot, self.rows = robot, rows
-        self.rigid: dict[tuple[object, ...], list[Floats]] = {}
-        self.parts: dict[tuple[object, ...], tuple[float, ...]] = {}
+        self.rigid: dict[tuple[object, int | None], Floats] = {}
+        self.fits: dict[Reading, Fit] = {}
 
     def fit(self, reading: Reading) -> Fit:
-        parts = [self._fit_of(reading, j) for j in range(len(reading.order))]
-        return Fit(*(np.array(part) for part in zip(*parts, strict=True)))
+        """Computed once for each reading."""
+        if reading not in self.fits:
+            self.fits[reading] = _fit_joints(*self._rows_of(reading))
+        return self.fits[reading]
 
-    def _fit_of(self, reading: Reading, j: int) -> tuple[float, ...]:
-        """Of one joint; computed once for each torque and each way to read the angles."""
-        column = reading.torque_order[j]
-        torque = reading.torque[column]
-        key = (reading.order, reading.position, reading.zero, j, column, torque, reading.gravity)
-        if key not in self.parts:
-            columns, measured, _ = self._rows_of(reading, j)
-            self.parts[key] = _fit_joint(columns, measured)
-        return self.parts[key]
-
-    def _rows_of(self, reading: Reading, j: int) -> tuple[Floats, Floats, Bools]:
-        """Of one joint: rigid torque, direction and speed; measured torque; and in which rows it moves."""
-        rows, column, own = self.rows, reading.torque_order[j], reading.order[j]
-        factor = reading.position[own]
-        torque = reading.torque[column] * rows.torque[:, column]
-        moves = rows.moving[:, own] & ~np.isnan(torque)
+    def _rows_of(self, reading: Reading) -> tuple[Floats, Floats, Bools]:
+        """Rigid torque, direction and speed, shape=(n, joints, 3); measured torque; and in which rows which
+        joint moves.
+        """
+        rows, order = self.rows, list(reading.order)
+        factor = np.array(reading.position)[order]
+        torque = (rows.torque * np.array(reading.torque))[:, list(reading.torque_order)]
         columns = (
-            self._rigid_of(reading)[:, j],
-            math.copysign(1.0, factor) * rows.direction[:, own],
-            factor * rows.qd[:, own],
+            self._rigid_of(reading),
+            np.copysign(1.0, factor) * rows.direction[:, order],
+            factor * rows.qd[:, order],
         )
-        return np.column_stack(columns)[moves], torque[moves], moves
+        return np.stack(columns, axis=2), torque, rows.moving[:, order] & ~np.isnan(torque)
 
     def _rigid_of(self, reading: Reading) -> Floats:
         """Rigid torques are linear in gravity: those without it, and by each axis of it."""
         key = (reading.order, reading.position, reading.zero)
-        if key not in self.rigid:
+        if (key, None) not in self.rigid:
             motion = self._angles(reading), *(self._read(x, reading) for x in (self.rows.qd, self.rows.qdd))
             weightless = gravity.under(self.robot, np.zeros(3))
-            self.rigid[key] = [
-                np.asarray(_core.rigid_torques(weightless, *motion)),
-                *(gravity.weight(self.robot, axis, motion[0]) for axis in np.eye(3)),
-            ]
-        without, *axes = self.rigid[key]
-        return without + sum(size * axis for size, axis in zip(reading.gravity, axes, strict=True))
+            self.rigid[key, None] = np.asarray(_core.rigid_torques(weightless, *motion))
+        out = self.rigid[key, None]
+        for axis, size in enumerate(reading.gravity):
+            if size and (key, axis) not in self.rigid:
+                self.rigid[key, axis] = gravity.weight(self.robot, np.eye(3)[axis], self._angles(reading))
+            out = out + size * self.rigid[key, axis] if size else out
+        return out
 
     def _read(self, columns: Floats, reading: Reading) -> Floats:
         return np.asarray((columns * np.array(reading.position))[:, list(reading.order)])
@@ -191,13 +185,12 @@ class _Model:
     def _left_beside(self, reading: Reading, pulls: Floats) -> tuple[float, Floats]:
         """What is left, over all joints, with more columns, shape=(n, joints, k), and their factors."""
         sides, torques = [], []
-        for j in range(len(reading.order)):
-            left, scale, *_ = self._fit_of(reading, j)
-            if math.isnan(left):
-                continue
-            columns, torque, moves = self._rows_of(reading, j)
-            used = columns if scale > 0.0 else columns[:, 1:]
-            both = _without(used, np.column_stack([torque, pulls[moves, j]]))
+        columns, measured, moves = self._rows_of(reading)
+        fit = self.fit(reading)
+        for j in np.flatnonzero(~np.isnan(fit.left)):
+            own, torque = columns[moves[:, j], j], measured[moves[:, j], j]
+            used = own if fit.scale[j] > 0.0 else own[:, 1:]
+            both = _without(used, np.column_stack([torque, pulls[moves[:, j], j]]))
             both /= torque.std() * math.sqrt(len(torque))
             torques.append(both[:, 0])
             sides.append(both[:, 1:])
@@ -213,36 +206,43 @@ def _without(columns: Floats, values: Floats) -> Floats:
 
 
 def _not_negative(gram: Floats, right: Floats) -> Floats:
-    """Factors of least squares that are not negative: the best of all subsets of the three columns."""
-    parts = np.where(_BOTH_IN, gram, np.eye(3))
-    able = np.linalg.det(parts) >= DEPENDENT
-    if not able.any():
-        return np.zeros(3)
-    factors = np.linalg.solve(parts[able], (_SUBSETS * right)[able][:, :, None])[:, :, 0]
-    explained = np.where((factors >= 0.0).all(axis=1), factors @ right, 0.0)
-    best = int(np.argmax(explained))
-    return np.asarray(factors[best] if explained[best] > 0.0 else np.zeros(3))
-
-
-def _fit_joint(columns: Floats, torque: Floats) -> tuple[float, ...]:
-    """Least squares with an offset, the other factors not negative.
-
-    Returns what is left of the variance, the first factor, and what it and the others explain.
+    """Factors of least squares that are not negative: the best of all subsets of the three columns.
+    shape=(joints, 3)
     """
-    nothing = (math.nan,) * 4
-    if len(torque) < FEWEST:
-        return nothing
-    x, y = columns - columns.mean(axis=0), torque - torque.mean()
-    size = np.sqrt(np.einsum("ij,ij->j", x, x))
-    total = float(y @ y)
-    if not total > 0.0:
-        return nothing
-    x = x / np.where(size > 0.0, size, 1.0)
-    factors = _not_negative(x.T @ x, x.T @ y)
-    left = float(np.sum((y - x @ factors) ** 2))
-    friction = x[:, 1:] @ factors[1:]
-    scale = factors[0] / size[0] if size[0] > 0.0 else 0.0
-    return left / total, scale, factors[0] ** 2 / total, float(friction @ friction) / total
+    parts = np.where(_BOTH_IN, gram[:, None], np.eye(3))
+    able = np.linalg.det(parts) >= DEPENDENT
+    parts[~able] = np.eye(3)
+    factors = np.linalg.solve(parts, (_SUBSETS * right[:, None])[..., None])[..., 0]
+    explained = np.where(able & (factors >= 0.0).all(axis=2), np.einsum("jsk,jk->js", factors, right), 0.0)
+    best = np.argmax(explained, axis=1)[:, None]
+    chosen = np.take_along_axis(factors, best[:, :, None], axis=1)[:, 0]
+    return np.asarray(np.where(np.take_along_axis(explained, best, axis=1) > 0.0, chosen, 0.0))
+
+
+def _fit_joints(columns: Floats, torque: Floats, moves: Bools) -> Fit:
+    """Least squares of each joint with an offset, the other factors not negative."""
+    inside, count = moves.T[:, :, None], np.maximum(moves.sum(axis=0), 1)[:, None, None]
+
+    def centred(values: Floats) -> Floats:
+        values = np.where(inside, values, 0.0)
+        return np.where(inside, values - values.sum(axis=1, keepdims=True) / count, 0.0)
+
+    x, y = centred(columns.swapaxes(0, 1)), centred(torque.T[:, :, None])
+    size, total = np.sqrt((x**2).sum(axis=1)), (y**2).sum(axis=(1, 2))
+    x /= np.where(size > 0.0, size, 1.0)[:, None]
+    across = x.swapaxes(1, 2)
+    factors = _not_negative(across @ x, (across @ y)[:, :, 0])
+    left = ((y - x @ factors[:, :, None]) ** 2).sum(axis=(1, 2))
+    by_friction = ((x[:, :, 1:] @ factors[:, 1:, None]) ** 2).sum(axis=(1, 2))
+    known = (moves.sum(axis=0) >= FEWEST) & (total > 0.0)
+    variance = np.where(known, total, np.nan)
+    scale = np.where(size[:, 0] > 0.0, factors[:, 0] / np.where(size[:, 0] > 0.0, size[:, 0], 1.0), 0.0)
+    return Fit(
+        left / variance,
+        np.where(known, scale, np.nan),
+        factors[:, 0] ** 2 / variance,
+        by_friction / variance,
+    )
 
 
 # ---- Readings --------------------------------------------------------------------------------------
