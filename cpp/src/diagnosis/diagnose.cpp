@@ -125,14 +125,48 @@ Work prepare(Registered given, const std::optional<Linearisation>& there = {}) {
   return work;
 }
 
+/// Which way is down: as the robot's file has it, or as springs show.
+enum class Down { as_written, as_springs_show };
+
 /// The same; where springs show another gravity than the robot's file has, with that one.
-Work prepare_under_gravity(Registered* whole, const std::vector<std::int32_t>& rows, Robot* robot, Diagnosis* out) {
+Work prepare_under_gravity(Down which, Registered* whole, const std::vector<std::int32_t>& rows, Robot* robot,
+                           Diagnosis* out) {
   Work work = prepare(part_of(*whole, rows));
-  const std::optional<Eigen::Vector3d> down = whole->mistaken ? std::nullopt : other_gravity(work);
+  if (whole->mistaken || which == Down::as_written) return work;
+  const std::optional<Eigen::Vector3d> down = other_gravity(work);
   if (!down) return work;
   robot->gravity = whole->frames.robot.gravity = *down;
   out->sanity.push_back(gravity_finding(*down));
   return prepare(part_of(*whole, rows));
+}
+
+/// A motion that depends on the weight that hangs on a joint. What an effect of one's own depends on, nobody knows.
+bool follows_weight(const EffectTraits& traits) {
+  return traits.driver == Driver::gravity_torque || traits.driver == Driver::motor_torque ||
+         (traits.driver == Driver::several && traits.moves == Moves::joint);
+}
+
+bool follows_weight(const Work& work, int group) {
+  const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(group)];
+  return (e.kind == Kind::catalogue && follows_weight(effect_traits(work, e))) ||
+         std::any_of(e.inputs.begin(), e.inputs.end(), [&](int input) {
+           return work.inputs[static_cast<std::size_t>(input)].name.rfind("torque", 0) == 0;
+         });
+}
+
+/// Something depends on weight: what was found, what these data do not tell from it, or what the robot has from before.
+bool does_weight_matter(const Work& work, const Robot& robot, const Decision& decision,
+                        const std::map<int, Sureness>& names) {
+  std::vector<int> groups = decision.state.choice.groups;
+  for (const auto& [name, sure] : names) {
+    for (const Rival& rival : sure.rivals) {
+      if (rival.in_class) groups.push_back(rival.group);
+    }
+  }
+  return std::any_of(groups.begin(), groups.end(), [&](int group) { return follows_weight(work, group); }) ||
+         std::any_of(robot.effects.begin(), robot.effects.end(), [&](const AppliedEffect& effect) {
+           return follows_weight(model::traits_of(effect.effect, work.given.options.own_effects));
+         });
 }
 
 /// Sections 3 to 6; again where a target turns out to be elsewhere than where the columns were taken.
@@ -485,25 +519,9 @@ std::vector<std::vector<double>> copied(const std::vector<Column>& columns, std:
   return out;
 }
 
-}  // namespace
-}  // namespace diagnosis
-
-bool DiagnoseOptions::is_valid(std::string* error) const {
-  const auto fail = [&](const char* why) {
-    if (error) *error = why;
-    return false;
-  };
-  if (!(false_alarm > 0.0 && false_alarm < 0.5)) return fail("false_alarm must be in (0, 0.5)");
-  if (max_effects < 1) return fail("max_effects must be at least 1");
-  if (!(test_share > 0.0 && test_share < 0.9)) return fail("test_share must be in (0, 0.9)");
-  if (search_poses < 50) return fail("search_poses must be at least 50");
-  if (resamples < 0) return fail("resamples must not be negative");
-  if (!(rotation_length > 0.0)) return fail("rotation_length must be positive [m]");
-  return true;
-}
-
-Diagnosis diagnose(const Robot& as_written, const Measurements& given, const DiagnoseOptions& options) {
-  refuse_what_cannot_be_used(as_written, given, options);
+/// All sections. None: springs seemed to show another gravity, and nothing that was found under it depends on it.
+std::optional<Diagnosis> diagnosed(const Robot& as_written, const Measurements& given, const DiagnoseOptions& options,
+                                   Down which) {
   Robot robot = as_written;
   Diagnosis result;
   result.seed = options.seed;
@@ -524,7 +542,7 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   if (rows.size() < rows_that_count(whole.data))
     result.warnings.push_back("searched on " + std::to_string(rows.size()) + " of " + std::to_string(whole.data.rows) +
                               " rows; fitted and judged on all");
-  Work work = prepare_under_gravity(&whole, rows, &robot, &result);
+  Work work = prepare_under_gravity(which, &whole, rows, &robot, &result);
   result.robot_before = whole.frames.robot;
 
   // 3. to 6. What explains it, and 7. how sure that is.
@@ -541,6 +559,8 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
     decision.corrects[departure] = law;
     names.erase(departure);
   }
+  const bool turned = robot.gravity != as_written.gravity;
+  if (turned && !does_weight_matter(work, robot, decision, names)) return std::nullopt;
   result.p_gap = decision.p_gap;
   result.remaining_structure_p = decision.p_left;
 
@@ -576,6 +596,29 @@ Diagnosis diagnose(const Robot& as_written, const Measurements& given, const Dia
   add_next_poses(work, whole.data, options, decision, &result);
   result.sentence = sentence_of(result);
   return result;
+}
+
+}  // namespace
+}  // namespace diagnosis
+
+bool DiagnoseOptions::is_valid(std::string* error) const {
+  const auto fail = [&](const char* why) {
+    if (error) *error = why;
+    return false;
+  };
+  if (!(false_alarm > 0.0 && false_alarm < 0.5)) return fail("false_alarm must be in (0, 0.5)");
+  if (max_effects < 1) return fail("max_effects must be at least 1");
+  if (!(test_share > 0.0 && test_share < 0.9)) return fail("test_share must be in (0, 0.9)");
+  if (search_poses < 50) return fail("search_poses must be at least 50");
+  if (resamples < 0) return fail("resamples must not be negative");
+  if (!(rotation_length > 0.0)) return fail("rotation_length must be positive [m]");
+  return true;
+}
+
+Diagnosis diagnose(const Robot& robot, const Measurements& given, const DiagnoseOptions& options) {
+  refuse_what_cannot_be_used(robot, given, options);
+  std::optional<Diagnosis> out = diagnosed(robot, given, options, Down::as_springs_show);
+  return out ? std::move(*out) : *diagnosed(robot, given, options, Down::as_written);
 }
 
 }  // namespace truing
