@@ -428,8 +428,9 @@ void share_the_gap(Diagnosis* out) {
   for (UnknownEffect& unknown : out->unknown) unknown.share *= factor;
   std::stable_sort(out->effects.begin(), out->effects.end(),
                    [](const FoundEffect& a, const FoundEffect& b) { return a.share > b.share; });
-  std::stable_sort(out->unknown.begin(), out->unknown.end(),
-                   [](const UnknownEffect& a, const UnknownEffect& b) { return a.probability > b.probability; });
+  std::stable_sort(out->unknown.begin(), out->unknown.end(), [](const UnknownEffect& a, const UnknownEffect& b) {
+    return a.probability != b.probability ? a.probability > b.probability : a.share > b.share;
+  });
 }
 
 void describe_all(const Work& work, const Evidence& evidence, const Decision& decision, const Resampled& resampled,

@@ -761,6 +761,29 @@ def test_what_is_handed_out_has_shapes_and_cannot_be_changed() -> None:
     assert "Diagnosis('" in repr(found) and found.sentence in found.summary()
 
 
+def bent(name: str, joint: int, motion: Any, *, poses: int, noise: float, seed: int) -> truing.Diagnosis:
+    """One joint moves by a function of the angles that no catalogue has. `noise`: of the size at the tip."""
+    robot = truing.load_robot(str(example(name)))
+    rng = np.random.default_rng(seed)
+    low = [max(j.lower, -2.8) for j in robot.joints]
+    joints = rng.uniform(low, [min(j.upper, 2.8) for j in robot.joints], (poses, len(low)))
+    moved = joints.copy()
+    moved[:, joint] += 2e-3 * motion(joints)
+    there, here = (
+        np.asarray(truing.predict(robot, truing.Measurements(q)).position) for q in (moved, joints)
+    )
+    sigma = noise * np.linalg.norm(there - here, axis=1).std()
+    positions = there + rng.normal(0, sigma, there.shape)
+    return truing.diagnose(robot, truing.Measurements(joints, positions=positions))
+
+
+def test_of_unknown_functions_the_one_that_does_most_is_told_first() -> None:
+    found = bent(
+        "irb120", 2, lambda q: np.exp(-0.5 * ((q[:, 1] - 0.2) / 0.4) ** 2), poses=150, noise=0.08, seed=1
+    )
+    assert [(u.joint, u.inputs) for u in found.unknown[:1]] == [("J3", ("q2",))]
+
+
 def test_the_names_of_the_results_are_public() -> None:
     for name in (
         "DiagnoseOptions",
