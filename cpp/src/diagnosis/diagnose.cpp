@@ -309,7 +309,7 @@ Fitted fit_exactly(const Registered& whole, const Work& work, const std::vector<
   std::vector<int> named_groups, catalogue_groups, tabled_groups;
   for (const int g : every_group) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    if (e.kind != Kind::free || corrects_a_law(decision, g)) named_groups.push_back(g);
+    if (is_named(e) || corrects_a_law(decision, g)) named_groups.push_back(g);
     if (is_in_catalogue(e)) catalogue_groups.push_back(g);
     if (is_in_catalogue(e) || fits_in_tables(e, inputs)) tabled_groups.push_back(g);
   }

@@ -782,6 +782,16 @@ def test_of_unknown_functions_the_one_that_does_most_is_told_first() -> None:
         "irb120", 2, lambda q: np.exp(-0.5 * ((q[:, 1] - 0.2) / 0.4) ** 2), poses=150, noise=0.08, seed=1
     )
     assert [(u.joint, u.inputs) for u in found.unknown[:1]] == [("J3", ("q2",))]
+    assert "Unknown: J3 moves as a function of q2" in found.sentence
+
+
+def test_what_is_told_as_unknown_does_not_count_as_named() -> None:
+    """Beside the bump stands a function of J2, in the place of a law: alone it makes errors larger."""
+    found = bent(
+        "irb120", 2, lambda q: np.exp(-0.5 * ((q[:, 1] - 0.2) / 0.4) ** 2), poses=150, noise=0.08, seed=1
+    )
+    assert not found.effects and found.verdict == "unknown"
+    assert found.after.rms == found.gap.rms and found.after_unknown.rms < 0.3 * found.gap.rms
 
 
 def test_the_names_of_the_results_are_public() -> None:
