@@ -342,15 +342,17 @@ static void draw_law(const Work& work, const Decision& decision, int g, FoundEff
     const std::size_t joint = work.given.frames.robot.joint_index(e.joints[0]);
     return Along{input, work.design.joint_column[joint][0]};
   };
+  std::set<int> over;
   for (const int other : decision.state.choice.groups) {
     const auto corrected = decision.corrects.find(other);
     if (corrected == decision.corrects.end() || corrected->second != g) continue;
     const Explanation& correction = named[static_cast<std::size_t>(other)];
     if (is_named(correction)) continue;  // in words, by add_departures
     const std::string driver = work.inputs[static_cast<std::size_t>(correction.inputs[0])].name;
+    const int input = input_named(work, driver);
+    if (!over.insert(input).second) continue;  // two of its functions, one curve of all that it makes
     out->note +=
         (out->note.empty() ? "" : "; ") + std::string("its law is not the simple one: see the curve over ") + driver;
-    const int input = input_named(work, driver);
     if (input >= 0 && !e.joints.empty()) out->curves.push_back(curve_of(work, decision, g, at_joint(input)));
   }
   const int driver = input_named(work, e.driver);

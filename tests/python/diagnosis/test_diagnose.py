@@ -794,6 +794,13 @@ def test_what_is_told_as_unknown_does_not_count_as_named() -> None:
     assert found.after.rms == found.gap.rms and found.after_unknown.rms < 0.3 * found.gap.rms
 
 
+def test_what_corrects_a_law_is_said_and_drawn_once() -> None:
+    found = bent("ur10", 0, lambda q: q[:, 0] > 0.3, poses=230, noise=0.125, seed=7)
+    for effect in found.effects:
+        said, drawn = effect.note.split("; "), [(c.site, c.input, c.second_input) for c in effect.curves]
+        assert len(said) == len(set(said)) and len(drawn) == len(set(drawn))
+
+
 def test_the_names_of_the_results_are_public() -> None:
     for name in (
         "DiagnoseOptions",
