@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 AXES = "xyz"
 
@@ -75,6 +76,31 @@ def fail(message: str) -> None:
 
 def table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words: bool = False) -> None:
     """A table on stdout. `words`: its cells are no numbers."""
+    cells = [[harmless(cell) for cell in line] for line in lines]
+    out = console()
+    drawn = _drawn(title, head, cells, words, kept=False)
+    if out.measure(drawn, options=out.options.update(max_width=_ENDLESS)).maximum > out.width:
+        # What a line is about keeps its room; the other columns give way.
+        room = min(_ROOM, out.width // 3)
+        cells = [[_folded(line[0], room, out), *line[1:]] for line in cells]
+        drawn = _drawn(title, head, cells, words, kept=True)
+    out.print(drawn)
+
+
+_ENDLESS = 10_000  # letters of a line
+_ROOM = 24  # letters
+
+
+def _folded(text: str, room: int, out: Console) -> str:
+    from rich.text import Text
+
+    return "\n".join(line.plain.rstrip() for line in Text(text).wrap(out, room))
+
+
+def _drawn(
+    title: str, head: Sequence[str], cells: Sequence[Sequence[str]], words: bool, *, kept: bool
+) -> Table:
+    """`kept`: the first column stays as wide as it is."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -88,14 +114,15 @@ def table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words
     )
     for k, name in enumerate(head):
         left = k == 0 or len(head) == 2 or words
-        # What a line is about stays on one line; the other columns give way.
-        least = min(24, max((len(line[0]) for line in lines), default=0)) if k == 0 else None
         drawn.add_column(
-            Text(harmless(name)), justify="left" if left else "right", overflow="fold", min_width=least
+            Text(harmless(name)),
+            justify="left" if left else "right",
+            overflow="fold",
+            no_wrap=kept and k == 0,
         )
-    for line in lines:
-        drawn.add_row(*(Text(harmless(cell)) for cell in line))
-    console().print(drawn)
+    for line in cells:
+        drawn.add_row(*(Text(cell) for cell in line))
+    return drawn
 
 
 def mm(metres: float | None) -> str:

@@ -23,6 +23,7 @@ import pytest
 import truing
 from tables import columns
 from truing.cli import main
+from truing.cli.tables import table
 from truing.examples import example
 
 ROBOT = str(example("irb120"))
@@ -177,6 +178,30 @@ def test_a_plan_is_measured_by_the_simulator(capsys: pytest.CaptureFixture[str])
     assert main(["simulate", ROBOT, "--plan", "planned/poses.csv", "--out", "sim"]) == 0
     measured = columns("sim/measurements.csv")
     assert [float(value) for value in measured["q3_rad"]] == joints[:, 2].tolist()
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_a_table_loses_no_letter_of_long_names_and_their_figures(
+    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    lines = [
+        (
+            "backlash left_shoulder_roll_joint",
+            "backlash panda_joint7",
+            "0.042",
+            "0.042",
+            "0.068 mrad",
+            "0.3 mrad",
+        ),
+        ("gear ratio panda_joint5", "harmonic panda_finger_joint1", "0.019", "-", "85 ppm", "never"),
+    ]
+    table("told apart", ("", "from", "R2", "after", "from this size on", "after"), lines, words=True)
+    out = capsys.readouterr().out
+    assert all(len(line) <= width for line in out.splitlines())
+    said = "".join(sum(lines, ()))
+    missing = [letter for letter in set(said) - {" "} if out.count(letter) < said.count(letter)]
+    assert not missing
 
 
 def test_a_plan_says_which_effects_it_tells_apart(capsys: pytest.CaptureFixture[str]) -> None:
