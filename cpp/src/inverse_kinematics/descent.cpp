@@ -284,6 +284,22 @@ bool stop_at_limits(const Problem& problem, const Rows& rows, const double* q, d
   return within;
 }
 
+/// What turns by a shortened step leaves the rest of the error to what slides. True: nothing that is free slides.
+bool shorten_turns(const Problem& problem, const Rows& rows, double shorten, double* step, ActiveSet* set) {
+  const int n = problem.arm.driven();
+  bool slides = false;
+  for (int j = 0; j < n; ++j) slides = slides || (set->free[j] && !problem.arm.turns(j));
+  for (int j = 0; j < n; ++j) {
+    if (!set->free[j]) continue;
+    step[j] *= shorten;
+    if (!slides || !problem.arm.turns(j)) continue;
+    set->free[j] = false;
+    for (int r = 0; r < rows.count; ++r) set->error[r] -= rows.column[j][r] * step[j];
+    add_joint(problem, rows, j, -1.0, set);
+  }
+  return !slides;
+}
+
 /// dq = W J^T (J W J^T + damping I)^-1 error over the joints that are free to move: the damped pseudo-inverse with
 /// joint scales W. A joint that would pass its limit goes to the limit and no further, and the others are solved for
 /// again with what is then left of the error: an active set, so that the error is redistributed and not cut off.
@@ -298,10 +314,7 @@ bool solve_step(const Problem& problem, const Rows& rows, const double* q, doubl
     // What is too long is shortened first: a joint stops at its limit only where the shortened step would pass it.
     const double shorten = longest > problem.options.longest_step ? problem.options.longest_step / longest : 1.0;
     if (!problem.options.ignore_limits && !stop_at_limits(problem, rows, q, shorten, step, &set)) continue;
-    for (int j = 0; j < n; ++j) {
-      if (set.free[j]) step[j] *= shorten;
-    }
-    return true;
+    if (shorten == 1.0 || shorten_turns(problem, rows, shorten, step, &set)) return true;
   }
   return true;
 }
