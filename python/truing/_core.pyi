@@ -3198,9 +3198,10 @@ class HandEyeOptions:
     reject_beyond = 3.0: Poses whose root mean square of six standardised residuals is larger.
     recognise = True: Where the loop does not close: try other readings of the same numbers, and name the one that closes.
     reading = '': Use the poses in this other reading, a name of `handeye_readings`; empty: as given.
-    max_iterations = 50: The fit stops here at the latest.
+    max_iterations = 1000: The fit stops here at the latest: which noise is whose may take hundreds of short steps to find from
+        few poses.
     """
-    def __init__(self, *, setup: typing.Literal['eye-in-hand', 'eye-to-hand'] = 'eye-in-hand', method: typing.Literal['refined', 'closed-form'] = 'refined', hand_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, hand_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, pixel_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, refine_camera: bool = False, working_point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, known_height: typing.SupportsFloat | typing.SupportsIndex | None = None, known_height_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject: bool = True, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 3.0, recognise: bool = True, reading: str = '', max_iterations: typing.SupportsInt | typing.SupportsIndex = 50) -> None:
+    def __init__(self, *, setup: typing.Literal['eye-in-hand', 'eye-to-hand'] = 'eye-in-hand', method: typing.Literal['refined', 'closed-form'] = 'refined', hand_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, hand_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_position_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, camera_rotation_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, pixel_sigma: typing.SupportsFloat | typing.SupportsIndex | None = None, refine_camera: bool = False, working_point: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, known_height: typing.SupportsFloat | typing.SupportsIndex | None = None, known_height_sigma: typing.SupportsFloat | typing.SupportsIndex = 0.0, reject: bool = True, reject_beyond: typing.SupportsFloat | typing.SupportsIndex = 3.0, recognise: bool = True, reading: str = '', max_iterations: typing.SupportsInt | typing.SupportsIndex = 1000) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, ...]:
         ...
@@ -3267,7 +3268,8 @@ class HandEyeOptions:
     @property
     def max_iterations(self) -> int:
         """
-        The fit stops here at the latest.
+        The fit stops here at the latest: which noise is whose may take hundreds of short steps to find from
+        few poses.
         """
     @max_iterations.setter
     def max_iterations(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:

@@ -207,7 +207,8 @@ class HandEyeKeywords(TypedDict, total=False):
     reading: str
     """Use the poses in this other reading, a name of `handeye_readings`; empty: as given."""
     max_iterations: int
-    """The fit stops here at the latest."""
+    """The fit stops here at the latest: which noise is whose may take hundreds of short steps to find from
+    few poses."""
 
 class HandEyePlanKeywords(TypedDict, total=False):
     count: int

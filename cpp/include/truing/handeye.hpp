@@ -83,8 +83,9 @@ struct HandEyeOptions {
   double reject_beyond = 3.0;       ///< poses whose root mean square of six standardised residuals is larger
   /// Where the loop does not close: try other readings of the same numbers, and name the one that closes.
   bool recognise = true;
-  std::string reading;      ///< use the poses in this other reading, a name of `handeye_readings`; empty: as given
-  int max_iterations = 50;  ///< the fit stops here at the latest
+  std::string reading;  ///< use the poses in this other reading, a name of `handeye_readings`; empty: as given
+  /// The fit stops here at the latest: which noise is whose may take hundreds of short steps to find from few poses.
+  int max_iterations = 1000;
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;

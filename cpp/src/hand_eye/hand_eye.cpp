@@ -582,10 +582,16 @@ void describe(const HandEyeOptions& options, const Agreement& agreement, double 
   look_behind(work.problem.B, work.fitted, result);
   look_at_errors(options, std::max(result->working_point.norm(), size), result);
   if (result->status != HandEyeStatus::done) return;
-  if (!result->solver.converged) result->status = HandEyeStatus::not_converged;
-  result->message = "Camera found from " + std::to_string(work.fitted.size()) + " poses; at the working point " +
-                    millimetres(std::sqrt(result->working_point_covariance.trace() / 3.0)) +
-                    " standard error per axis.";
+  const std::string poses = std::to_string(work.fitted.size()) + " poses";
+  const std::string error =
+      millimetres(std::sqrt(result->working_point_covariance.trace() / 3.0)) + " standard error per axis.";
+  if (result->solver.converged) {
+    result->message = "Camera found from " + poses + "; at the working point " + error;
+    return;
+  }
+  result->status = HandEyeStatus::not_converged;
+  result->message = "The fit to " + poses + " did not come to an end in " + std::to_string(result->solver.iterations) +
+                    " iterations; where it stands, at the working point " + error;
 }
 
 }  // namespace
