@@ -144,6 +144,8 @@ class Rest {
 std::vector<ValuedTerm> terms_beside(const TorqueDesign& design, std::size_t joint, const JointGrams& grams,
                                      double design_effect, const std::vector<int>& in_choice, const VectorXd& chosen,
                                      const std::vector<VectorXd>& without, double least_gain) {
+  const auto has_rows = [](const Gram& fold) { return fold.xx.size() > 0; };
+  if (std::none_of(grams.folds.begin(), grams.folds.end(), has_rows)) return {};  // at rest in all recordings
   const Others others = others_of(design, joint, grams, in_choice);
   if (others.places.empty()) return {};
   const Rest rest(grams, others, design_effect);

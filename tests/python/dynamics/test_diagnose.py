@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import truing
+from truing import _core
 from truing.dynamics import Recording, diagnose, identify, load_recordings, predict
 from truing.dynamics.api import markdown_table
 from truing.errors import InputError
@@ -70,6 +71,28 @@ def test_errors_in_motion_do_not_count_rows_at_rest() -> None:
         assert joint.n < held.held_out[j].n - 10
         assert joint.rms == pytest.approx(free.in_motion[j].rms, rel=0.01)
         assert held.held_out[j].rms > 1.05 * free.held_out[j].rms
+
+
+def test_a_joint_that_rests_in_all_recordings_has_no_names() -> None:
+    """None of its rows is fitted: there are no sums of it to look into."""
+    random = np.random.default_rng(0)
+    time = np.arange(0.0, 20.0, 0.01)
+    turns = 2.0 * np.pi / time[-1] * np.arange(1, 6)
+    recordings = []
+    for name in ("a", "b", "c", "d"):
+        sine = random.normal(size=(6, 5)) * 0.3
+        sine[5] = 0.0
+        phase = np.outer(turns, time)
+        position, speed, acceleration = (
+            (sine * factor @ wave).T
+            for factor, wave in ((1.0, np.sin(phase)), (turns, np.cos(phase)), (-(turns**2), np.sin(phase)))
+        )
+        torque = _core.rigid_torques(SIMULATED.nominal, position, speed, acceleration) + 2.0 * np.sign(speed)
+        torque += 0.2 * random.normal(size=torque.shape)
+        recordings.append(Recording(name, time=time, position=position, torque=torque))
+    found = diagnose(SIMULATED.nominal, recordings)
+    assert not [joints for _, joints in beyond_standard(found) if "J6" in joints]
+    assert np.isfinite(percent(found, "named")).all()
 
 
 def test_hidden_effects_are_named_with_their_sizes() -> None:
