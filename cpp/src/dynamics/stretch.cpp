@@ -147,17 +147,26 @@ void Stretch::resample(bool ended) {
 void Stretch::filter(bool ended) {
   const Index half = weights_.size() / 2;
   const Index reached = ended ? even_.end() : std::max<Index>(0, even_.end() - half);
-  const auto filtered_to = [&](RowWindow* out, Index first_column, Index stride) {
+  const Index rows = even_.all().rows(), seen = std::min(rows, std::max<Index>(1, half / 2) + 1);
+  // A joint that speeds up at an end does so beyond it: mirrored alone it would run on evenly.
+  const auto bends_of = [&](const double* q) {
+    Bends out;
+    if (even_.begin() == 0) out.first = bend_of(q, 1, seen);
+    if (ended) out.last = bend_of(q + rows - 1, -1, seen);
+    return out;
+  };
+  const auto filtered_to = [&](RowWindow* out, Index first_column, Index stride, bool are_positions) {
     const Index first = out->end(), end = std::max(first, (reached + stride - 1) / stride);
     MatrixXd more(end - first, joints_);
-    for (Index j = 0; j < joints_; ++j) {
-      filter_column(even_.all().col(first_column + j).data(), even_.all().rows(), weights_, stride,
-                    first - even_.begin() / stride, end - first, more.col(j).data());
+    for (Index j = 0; j < joints_ && end > first; ++j) {
+      const double* x = even_.all().col(first_column + j).data();
+      filter_column(x, rows, weights_, stride, first - even_.begin() / stride, end - first, more.col(j).data(),
+                    are_positions ? bends_of(x) : Bends{});
     }
     out->append(more);
   };
-  filtered_to(&smooth_, 0, 1);
-  filtered_to(&measured_, joints_, coarse_);
+  filtered_to(&smooth_, 0, 1, true);
+  filtered_to(&measured_, joints_, coarse_, false);
 }
 
 void Stretch::add_motion(bool ended) {

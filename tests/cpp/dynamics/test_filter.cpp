@@ -8,6 +8,7 @@
 #include "dynamics/filter.hpp"
 #include "kernel/kernel.hpp"
 #include "math/constants.hpp"
+#include "math/random.hpp"
 
 using namespace truing::dynamics;
 
@@ -98,6 +99,37 @@ TEST_CASE("every copy of the kernel filters as the sum says, and rows do not dep
 TEST_CASE("the rate of a sine is its cosine") {
   const double w = 2.0 * truing::math::kPi * 0.5;
   const Eigen::MatrixXd rate = rate_of(sine(0.5, 400), kStep);
-  for (Eigen::Index i = 1; i < 399; ++i)
+  for (Eigen::Index i = 0; i < 400; ++i)
     CHECK(std::abs(rate(i, 0) - w * std::cos(w * kStep * static_cast<double>(i))) < 1e-3 * w);
+}
+
+TEST_CASE("a motion that is recorded on its way accelerates at the ends of its record as it does within") {
+  const double w = 2.0 * truing::math::kPi * 0.9;
+  const Eigen::Index rows = 300, seen = 13;
+  const Eigen::MatrixXd all = sine(0.9, 400), x = all.middleRows(25, rows);  // from where it accelerates most
+  const Eigen::VectorXd weights = low_pass(8.0, kStep);
+  const auto largest_error = [&](const Bends& bends) {
+    Eigen::MatrixXd y(rows, 1);
+    filter_column(x.data(), rows, weights, 1, 0, rows, y.data(), bends);
+    const Eigen::MatrixXd acceleration = rate_of(rate_of(y, kStep), kStep);
+    return (acceleration + w * w * x).cwiseAbs().maxCoeff() / (w * w);
+  };
+  CHECK(largest_error({bend_of(x.data(), 1, seen), bend_of(x.data() + rows - 1, -1, seen)}) < 0.08);
+  CHECK(largest_error({}) > 0.4);
+}
+
+TEST_CASE("noise bends less than a fit to it says") {
+  Random random(4);
+  const Eigen::Index rows = 26;
+  double taken = 0.0, bent = 0.0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Eigen::VectorXd noise(rows);
+    for (double& value : noise) value = random.normal();
+    taken += std::pow(bend_of(noise.data(), 1, rows), 2.0);
+    for (Eigen::Index k = 0; k < rows; ++k) noise[k] += 0.5 * static_cast<double>(k * k);  // by 1 from row to row
+    bent += bend_of(noise.data(), 1, rows) / 200.0;
+  }
+  const double standard_error = 0.0454;  // of the second derivative of a cubic's end through 26 rows
+  CHECK(std::sqrt(taken / 200.0) < 0.5 * standard_error);
+  CHECK(std::abs(bent - 1.0) < 0.1);
 }

@@ -66,33 +66,52 @@ def test_errors_in_motion_do_not_count_rows_at_rest() -> None:
         rested = Recording("rested", time=time, position=position, torque=torque, test=True)
         return identify(SIMULATED.nominal, [*train, rested], effects=["coulomb", "viscous"]).errors[-1]
 
-    free, held = errors_with(0.0), errors_with(20.0)
+    free, held = errors_with(0.0), errors_with(40.0)
     for j, joint in enumerate(held.in_motion):
         assert joint.n < held.held_out[j].n - 10
         assert joint.rms == pytest.approx(free.in_motion[j].rms, rel=0.01)
         assert held.held_out[j].rms > 1.05 * free.held_out[j].rms
 
 
-def test_a_joint_that_rests_in_all_recordings_has_no_names() -> None:
-    """None of its rows is fitted: there are no sums of it to look into."""
+def recorded_on_the_way(noise: float, resting: int | None = None) -> list[Recording]:
+    """Four recordings that begin and end in motion, with friction that standard practice has."""
     random = np.random.default_rng(0)
     time = np.arange(0.0, 20.0, 0.01)
     turns = 2.0 * np.pi / time[-1] * np.arange(1, 6)
     recordings = []
     for name in ("a", "b", "c", "d"):
-        sine = random.normal(size=(6, 5)) * 0.3
-        sine[5] = 0.0
-        phase = np.outer(turns, time)
+        sizes = random.normal(size=(6, 5)) * 0.3
+        if resting is not None:
+            sizes[resting] = 0.0
+        phase = np.outer(turns, time) + random.uniform(0.0, 2.0 * np.pi, (5, 1))
         position, speed, acceleration = (
-            (sine * factor @ wave).T
+            (sizes * factor @ wave).T
             for factor, wave in ((1.0, np.sin(phase)), (turns, np.cos(phase)), (-(turns**2), np.sin(phase)))
         )
         torque = _core.rigid_torques(SIMULATED.nominal, position, speed, acceleration) + 2.0 * np.sign(speed)
-        torque += 0.2 * random.normal(size=torque.shape)
+        torque += noise * random.normal(size=torque.shape)
         recordings.append(Recording(name, time=time, position=position, torque=torque))
-    found = diagnose(SIMULATED.nominal, recordings)
+    return recordings
+
+
+def test_a_joint_that_rests_in_all_recordings_has_no_names() -> None:
+    """None of its rows is fitted: there are no sums of it to look into."""
+    found = diagnose(SIMULATED.nominal, recorded_on_the_way(0.2, resting=5))
     assert not [joints for _, joints in beyond_standard(found) if "J6" in joints]
     assert np.isfinite(percent(found, "named")).all()
+
+
+def test_torques_at_the_ends_of_a_recording_are_those_of_a_motion_that_goes_on() -> None:
+    """Mirrored at its end a motion would not accelerate there: standard practice would be 5 % off."""
+    recordings = recorded_on_the_way(0.02)
+    found = diagnose(SIMULATED.nominal, recordings)
+    assert beyond_standard(found) == []
+    assert percent(found, "standard").max() < 2.0
+    robot = identify(SIMULATED.nominal, recordings, effects=["coulomb"]).robot
+    whole, half = recordings[0], slice(730, None)
+    cut = Recording("cut", time=whole.time[half], position=whole.position[half])
+    off = predict(robot, cut).torque - predict(robot, whole).torque[half]
+    assert (np.sqrt((off[:10] ** 2).mean(axis=0)) < 0.1 * np.std(whole.torque, axis=0)).all()
 
 
 def test_hidden_effects_are_named_with_their_sizes() -> None:
@@ -272,11 +291,12 @@ def test_gears_of_real_arms_are_seen_in_what_is_left() -> None:
 @pytest.mark.realdata
 def test_friction_chosen_over_another_torque_takes_no_rotor_with_it() -> None:
     """With blocks 2, 4, 7 and 9 held out, load friction of three fifths was fitted to the dry friction of the
-    fourth joint; over the torque that it makes itself it leaves more than it found.
+    fourth joint; over the torque that it makes itself it leaves more than it found. At 20 Hz free inertias
+    predict folds as well as the file's by less than a standard error, one way or the other.
     """
     folder = real("dyn_tx40")
     robot = truing.load_robot(folder / "robot.urdf", any_tool=True)
-    found = diagnose(robot, load_recordings([folder / "run.csv"], robot), cutoff=20.0, test_share=0.4)
+    found = diagnose(robot, load_recordings([folder / "run.csv"], robot), cutoff=18.0, test_share=0.4)
     assert ("armature", "joint_4") in named_at_joints(found)
     assert np.exp(np.log(percent(found, "named")).mean()) < 9.5  # 10.4 before
 
