@@ -84,5 +84,5 @@ def visp_frame(document: Document) -> Floats:
 def _number(document: Document, row: int, entry: Any) -> float:
     value = entry[0] if isinstance(entry, list) and len(entry) == 1 else entry
     if not isinstance(value, Decimal) or not math.isfinite(value):
-        document.refuse(("data", row), f"found {found(entry)}, expected a finite number")
+        document.refuse(("data", row), f"found {found(value)}, expected a finite number")
     return float(value)
