@@ -29,6 +29,7 @@ from truing.dynamics import (
     predict,
 )
 from truing.dynamics.magnitudes import are_magnitudes, commands_for_magnitudes
+from truing.dynamics.sanity import loads
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.grids import grids_of
 from truing.dynamics.sanity.jumps import spikes
@@ -405,6 +406,13 @@ def test_torques_of_one_recording_on_another_scale_are_no_load(factor: float) ->
     assert finding.finding == "gain_differs" and finding.mistake
     assert finding.recordings == (scaled.name,)
     assert finding.value == pytest.approx(factor, rel=0.1)
+
+
+def test_torques_that_do_not_follow_the_links_have_no_scale() -> None:
+    """A drive's constant that is far off leaves multiples about zero: no recording's is another's."""
+    scales = [-0.335, 0.004, -0.135, 0.318, -0.039, -0.212]
+    fit: Any = SimpleNamespace(names=list("abcdef"), scale=lambda k: scales[k])
+    assert loads.gain_differs(fit) == []
 
 
 def test_torques_on_the_motors_side_are_a_mistake() -> None:

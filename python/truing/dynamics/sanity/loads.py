@@ -91,6 +91,8 @@ def gain_differs(fit: Compared) -> list[RecordingFinding]:
     """Recordings whose torques are a multiple of what the others' are, which no load explains as well."""
     scales = np.array([fit.scale(k) for k in range(len(fit.names))])
     usual = float(np.median(scales))
+    if not usual > 0.0:
+        return []  # torques that do not follow the links at all have no scale
     apart = [
         k
         for k, scale in enumerate(scales)
