@@ -35,9 +35,7 @@ struct Bundle {
   bool of_two = false;    ///< in their place functions of one or two of the inputs are tried, at this joint only
 };
 
-bool is_load(const Work& work, int input) {
-  return work.inputs[static_cast<std::size_t>(input)].name.rfind("torque", 0) == 0;
-}
+bool is_load(const Work& work, int input) { return is_torque(work.inputs[static_cast<std::size_t>(input)]); }
 
 bool are_among(const std::vector<int>& some, const std::vector<int>& all) {
   return std::all_of(some.begin(), some.end(),

@@ -370,13 +370,13 @@ static Evidence::Gain law_that_stands(const Work& work, const Evidence& evidence
 
 /// The function, and what else at its joint is a function of the same inputs.
 static std::vector<int> replaced_by_function(const Work& work, const Question& q, const std::vector<int>& inputs) {
-  const auto name_of = [&](int i) -> const std::string& { return work.inputs[static_cast<std::size_t>(i)].name; };
-  const bool by_configuration = std::all_of(
-      inputs.begin(), inputs.end(), [&](int i) { return name_of(i)[0] == 'q' || name_of(i).rfind("torque", 0) == 0; });
+  const auto input = [&](int i) -> const InputColumn& { return work.inputs[static_cast<std::size_t>(i)]; };
+  const bool by_configuration =
+      std::all_of(inputs.begin(), inputs.end(), [&](int i) { return input(i).name[0] == 'q' || is_torque(input(i)); });
   std::vector<int> gone = {q.function};
   for (const int g : q.here) {
     const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(g)];
-    const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) { return name_of(i) == e.driver; });
+    const bool of_these = std::any_of(inputs.begin(), inputs.end(), [&](int i) { return input(i).name == e.driver; });
     if (g != q.function &&
         (e.kind == Kind::free || of_these || (by_configuration && follows_configuration(effect_traits(work, e)))))
       gone.push_back(g);

@@ -149,9 +149,8 @@ bool follows_weight(const EffectTraits& traits) {
 bool follows_weight(const Work& work, int group) {
   const Explanation& e = work.design.candidates.named[static_cast<std::size_t>(group)];
   return (e.kind == Kind::catalogue && follows_weight(effect_traits(work, e))) ||
-         std::any_of(e.inputs.begin(), e.inputs.end(), [&](int input) {
-           return work.inputs[static_cast<std::size_t>(input)].name.rfind("torque", 0) == 0;
-         });
+         std::any_of(e.inputs.begin(), e.inputs.end(),
+                     [&](int input) { return is_torque(work.inputs[static_cast<std::size_t>(input)]); });
 }
 
 /// Something depends on weight: what was found, what these data do not tell from it, or what the robot has from before.

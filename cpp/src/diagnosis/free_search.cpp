@@ -52,7 +52,6 @@ struct Trial {
   std::vector<int> sites;
 };
 
-bool is_torque(const InputColumn& input) { return input.name.rfind("torque", 0) == 0; }
 bool is_direction(const InputColumn& input) { return input.name.rfind("dir", 0) == 0; }
 bool is_difference(const InputColumn& input) { return input.name.find('-') != std::string::npos; }
 bool is_motion(const InputColumn& input) { return input.name[0] == 'q' && !is_difference(input); }

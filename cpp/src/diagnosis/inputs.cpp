@@ -171,6 +171,8 @@ std::string input_name(Driver driver, std::size_t joint) {
   return "";
 }
 
+bool is_torque(const InputColumn& input) { return input.name.rfind("torque", 0) == 0; }
+
 std::vector<InputColumn> make_inputs(const Robot& robot, const Measurements& data) {
   return InputCollector(robot, data).collect();
 }

@@ -22,6 +22,9 @@ struct InputColumn {
   std::vector<double> values;
 };
 
+/// The weight that a joint carries.
+bool is_torque(const InputColumn& input);
+
 std::vector<InputColumn> make_inputs(const Robot& robot, const Measurements& data);
 
 /// Name of the input that drives an effect at a joint: "torque2"; empty: it has none, or several.

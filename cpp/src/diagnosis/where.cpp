@@ -135,7 +135,7 @@ void share_out(const Design& design, const std::vector<InputColumn>& inputs, con
   const auto nuisance = static_cast<Eigen::Index>(design.nuisance.size());
   std::vector<int> moving;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (!inputs[k].constant && inputs[k].name.rfind("torque", 0) != 0 && moving.size() < kMostMoving)
+    if (!inputs[k].constant && !is_torque(inputs[k]) && moving.size() < kMostMoving)
       moving.push_back(static_cast<int>(k));
   }
   std::vector<int> every_site;
