@@ -34,7 +34,8 @@ void copy_mirrored(const double* x, Eigen::Index rows, Eigen::Index begin, Eigen
     *out++ = 2.0 * x[last] - x[std::max<Eigen::Index>(0, 2 * last - k)] + bends.last * squared(k - last);
 }
 
-/// Residuals of least squares go on in time: how many of them count as one, from their correlation from row to row.
+/// Residuals of least squares go on in time: how many of them count as one where each goes on from the one before,
+/// (1 + rho) / (1 - rho) (Bayley and Hammersley, J. Royal Statistical Society, Suppl. 8 (1946) 184); no more than all.
 double rows_as_one(const Eigen::VectorXd& left) {
   const Eigen::Index n = left.size();
   const double rho = left.head(n - 1).dot(left.tail(n - 1)) / std::max(left.squaredNorm(), 1e-300);
@@ -59,7 +60,7 @@ Eigen::VectorXd low_pass(double cutoff, double step) {
 
 double bend_of(const double* x, Eigen::Index way, Eigen::Index rows) {
   constexpr int kTerms = 4;       // a cubic
-  constexpr double kPlain = 3.0;  // standard errors: a bend of so many is half of what it seems
+  constexpr double kPlain = 3.0;  // standard errors: a bend of so many is taken for half of what it seems
   if (rows < 2 * kTerms) return 0.0;
   const auto last = static_cast<double>(rows - 1);
   Eigen::MatrixXd powers(rows, kTerms);
