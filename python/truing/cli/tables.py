@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 AXES = "xyz"
 
+_ENDLESS = 10_000  # letters of a line that is never folded
+_ROOM = 24  # letters that the first column of a folded table keeps
+
 
 # Of Unicode's categories: control and format characters (escape sequences, text run backwards), half
 # characters, breaks of line and paragraph.
@@ -85,10 +88,6 @@ def table(title: str, head: Sequence[str], lines: Sequence[Sequence[str]], words
         cells = [[_folded(line[0], room, out), *line[1:]] for line in cells]
         drawn = _drawn(title, head, cells, words, kept=True)
     out.print(drawn)
-
-
-_ENDLESS = 10_000  # letters of a line
-_ROOM = 24  # letters
 
 
 def _folded(text: str, room: int, out: Console) -> str:

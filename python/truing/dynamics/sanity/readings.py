@@ -48,9 +48,8 @@ NOT_AT_ALL, WELL = 0.8, 0.2  # of the variance: a sign is certain where it takes
 BEYOND = 4.0  # times the limit of a joint: no angle is there
 BOTH = 0.05  # of the variance: rigid torque and friction both speak of the sign
 DEPENDENT = 1e-9  # determinant of columns of unit length that say the same
-_SUBSETS = np.array(
-    [one for one in itertools.product((True, False), repeat=3) if any(one)]
-)  # of three columns
+# Of three columns.
+_SUBSETS = np.array([one for one in itertools.product((True, False), repeat=3) if any(one)])
 _BOTH_IN = _SUBSETS[:, :, None] & _SUBSETS[:, None, :]
 
 
@@ -157,9 +156,11 @@ class _Model:
             self.rigid[key, None] = np.asarray(_core.rigid_torques(weightless, *motion))
         out = self.rigid[key, None]
         for axis, size in enumerate(reading.gravity):
-            if size and (key, axis) not in self.rigid:
+            if size == 0.0:
+                continue
+            if (key, axis) not in self.rigid:
                 self.rigid[key, axis] = gravity.weight(self.robot, np.eye(3)[axis], self._angles(reading))
-            out = out + size * self.rigid[key, axis] if size else out
+            out = out + size * self.rigid[key, axis]
         return out
 
     def _read(self, columns: Floats, reading: Reading) -> Floats:
