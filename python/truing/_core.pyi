@@ -918,7 +918,7 @@ class Recording:
     end [s] is the time of the last.
     Raises InputError naming the array when shapes or types do not fit; `validate_recording` checks the values.
     """
-    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, test: bool = False, pieces: collections.abc.Callable[[], collections.abc.Iterator[Recording]] | None = None, end: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, name: str, *, time: numpy.typing.ArrayLike, position: numpy.typing.ArrayLike, speed: numpy.typing.ArrayLike | None = None, torque: numpy.typing.ArrayLike | None = None, current: numpy.typing.ArrayLike | None = None, command: numpy.typing.ArrayLike | None = None, speed_command: numpy.typing.ArrayLike | None = None, torque_command: numpy.typing.ArrayLike | None = None, columns: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, torque_is_mean: bool = False, test: bool = False, pieces: collections.abc.Callable[[], collections.abc.Iterator[Recording]] | None = None, end: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __len__(self) -> int:
         ...
@@ -998,6 +998,12 @@ class Recording:
     def torque_command(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Shape=(n, joints) [Nm | N] torques commanded, if they were recorded.
+        """
+    @property
+    def torque_is_mean(self) -> bool:
+        """
+        Torques and currents are means over the time of a row, which is in its middle, and not values at its
+        instant: of rows that are more than 12 ms apart, as nearer ones show no difference.
         """
 class Obstacle:
     """

@@ -23,6 +23,21 @@ struct Predicted {
   std::vector<double> time;
   std::vector<VectorXd> torque;
 
+  /// The tile's own rows of torques at every row of its motion; where means were recorded, those of recorded rows.
+  void add(const Tile& tile, const MatrixXd& torques) {
+    const Index every = tile.means ? tile.between : 1;
+    const Index begin = tile.first * tile.stride;
+    const Index end = std::min(torques.rows(), (tile.first + tile.count) * tile.stride);
+    std::vector<VectorXd> columns;
+    for (Index j = 0; j < torques.cols(); ++j)
+      columns.push_back(means_of_rows(torques.col(j).data(), torques.rows(), every));
+    for (Index i = begin; i < end; i += every) {
+      time.push_back(tile.motion.time[i]);
+      torque.emplace_back(torques.cols());
+      for (std::size_t j = 0; j < columns.size(); ++j) torque.back()[static_cast<Index>(j)] = columns[j][i / every];
+    }
+  }
+
   /// Between the rows by straight lines.
   VectorXd at(double t) const {
     const auto next = std::lower_bound(time.begin(), time.end(), t);
@@ -65,13 +80,7 @@ TorquePrediction predict(const Robot& robot, const Recording& recording, std::op
   for_each_tile(recording, 0, robot, options, [&](Tile& tile) {
     if (model.needs_rigid())
       tile.motion.rigid = regressor_columns(chain, tile.motion.q, tile.motion.qd, tile.motion.qdd);
-    const MatrixXd torque = model.torque(&tile.motion);
-    const Index begin = tile.first * tile.stride;
-    const Index end = std::min(torque.rows(), (tile.first + tile.count) * tile.stride);
-    for (Index i = begin; i < end; ++i) {
-      predicted.time.push_back(tile.motion.time[i]);
-      predicted.torque.emplace_back(torque.row(i));
-    }
+    predicted.add(tile, model.torque(&tile.motion));
     return true;
   });
   TorquePrediction out;

@@ -71,6 +71,23 @@ std::vector<std::string> column_names(const Recording& recording) {
 
 }  // namespace
 
+VectorXd means_of_rows(const double* column, Index steps, Index between) {
+  VectorXd out = VectorXd::Zero((steps - 1) / between + 1);
+  const Index half = between / 2;
+  const double at_ends = between % 2 == 0 ? 0.5 : 1.0;  // an even number of steps ends half-way through two of them
+  for (Index row = 0; row < out.size(); ++row) {
+    const Index middle = row * between, reach = std::min({half, middle, steps - 1 - middle});
+    double weights = 0.0;
+    for (Index k = -reach; k <= reach; ++k) {
+      const double weight = std::abs(k) == half ? at_ends : 1.0;
+      weights += weight;
+      out[row] += weight * column[middle + k];
+    }
+    out[row] /= weights;
+  }
+  return out;
+}
+
 MatrixXd Tile::own_rows(const MatrixXd& values) const {
   MatrixXd out(count, values.cols());
   for (Index c = 0; c < values.cols(); ++c) own_rows(values.col(c).data(), out.col(c).data());
@@ -81,7 +98,8 @@ void Tile::own_rows(const double* column, double* out) const {
   if (between == 1) return filter_column(column, motion.rows(), weights, stride, first, count, out);
   const Index rows = (motion.rows() - 1) / between + 1;
   const VectorXd recorded =
-      Eigen::Map<const VectorXd, 0, Eigen::InnerStride<>>(column, rows, Eigen::InnerStride<>(between));
+      means ? means_of_rows(column, motion.rows(), between)
+            : Eigen::Map<const VectorXd, 0, Eigen::InnerStride<>>(column, rows, Eigen::InnerStride<>(between));
   filter_column(recorded.data(), rows, weights, stride / between, first, count, out);
 }
 
@@ -118,6 +136,7 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
   const auto complete = [&](Tile& tile) {
     any = true;
     tile.recording = number;
+    tile.means = recording.torque_is_mean;
     tile.motion.robot = &robot;
     tile.motion.links = chain.torques(tile.motion.q, tile.motion.qd, tile.motion.qdd, links);
     return more = use(tile);

@@ -45,6 +45,7 @@ struct Tile {
   Eigen::Index stride = 1;
   /// Torques were recorded at every so many rows of `motion`: the filter sees these alone.
   Eigen::Index between = 1;
+  bool means = false;        ///< Recording::torque_is_mean
   Eigen::Index first = 0;    ///< of the filtered rows those before it only lead in
   Eigen::Index count = 0;    ///< of filtered rows that are this tile's own
   Eigen::MatrixXd measured;  ///< shape=(count, joints) [Nm | N] filtered; NaN: not measured
@@ -62,6 +63,10 @@ struct Tile {
   /// Time of the tile's own rows [s].
   Eigen::VectorXd own_time() const;
 };
+
+/// A column of so many steps, `between` of which are a row's time: the mean over the time of each row, which is in its
+/// middle; at the ends over the part of it that is there on both sides.
+Eigen::VectorXd means_of_rows(const double* column, Eigen::Index steps, Eigen::Index between);
 
 struct PrepareOptions {
   double cutoff = 8.0;                    ///< [Hz]

@@ -54,9 +54,10 @@ SplineBetween::SplineBetween(double part, double step) : weights_(MatrixXd::Zero
   }
 }
 
-MatrixXd SplineBetween::at(const Eigen::Ref<const VectorXd>& x, Index first, Index count) const {
+MatrixXd SplineBetween::at(const Eigen::Ref<const VectorXd>& x, Index first, Index count, const Bends& bends) const {
   MatrixXd out(count, 3);
-  for (Index d = 0; d < 3; ++d) filter_column(x.data(), x.size(), weights_.col(d), 1, first, count, out.col(d).data());
+  for (Index d = 0; d < 3; ++d)
+    filter_column(x.data(), x.size(), weights_.col(d), 1, first, count, out.col(d).data(), bends);
   return out;
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "dynamics/filter.hpp"
 #include "rooms.hpp"
 
 namespace truing::dynamics {
@@ -17,8 +18,10 @@ class SplineBetween {
 
   /// part: 0 ... 1; step [s] between rows.
   SplineBetween(double part, double step);
-  /// From row `first` on, `count` times: shape=(count, 3). Beyond its ends x is mirrored at its end points.
-  Eigen::MatrixXd at(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Index first, Eigen::Index count) const;
+  /// From row `first` on, `count` times: shape=(count, 3). Beyond its ends x is mirrored at its end points, and bends
+  /// on.
+  Eigen::MatrixXd at(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Index first, Eigen::Index count,
+                     const Bends& bends = {}) const;
 
  private:
   Eigen::MatrixXd weights_;  ///< shape=(2 kReach + 1, 3) of the rows around

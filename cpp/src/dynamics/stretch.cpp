@@ -18,13 +18,14 @@ using Eigen::VectorXd;
 
 constexpr double kFinePerCutoff = 12.5;   ///< rows of a motion, per period of the cut-off
 constexpr double kCoarsePerCutoff = 3.1;  ///< rows that the fit sees
-constexpr double kFarApart = 0.024;       ///< [s] between rows: from here on differences say too little of a motion
-constexpr double kBetween = 100.0;        ///< rows a second of the curve through such rows, at most
+constexpr double kFarApart = 0.012;       ///< [s] between rows: from here on differences say too little of a motion
+constexpr double kBetween = 200.0;        ///< rows a second of the curve through such rows, at most
 constexpr double kMostOfRate = 0.25;      ///< cut-off to recorded rows a second: rows show nothing above a half
 constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
 constexpr double kForgets = 0.06;         ///< [rad | m] travel after which no play operator knows what was before
 constexpr double kMostLeadIn = 60.0;      ///< [s] of a joint that rests for longer, it is forgotten
 constexpr double kRestWindow = 0.25;      ///< [s] on both sides
+constexpr Index kFewestSeen = 8;          ///< rows that tell how a joint speeds up at an end
 constexpr double kEdge = 1.0;             ///< periods of the cut-off: a turn so near to an end is seen from one side
 
 /// Torques measured, or currents times the drives' constants: NaN throughout where there is neither.
@@ -144,24 +145,28 @@ void Stretch::resample(bool ended) {
   times_.erase(times_.begin(), times_.begin() + gone);
 }
 
+// A joint that speeds up at an end does so beyond it: mirrored alone it would run on evenly.
+Bends Stretch::bends_of(const RowWindow& positions, Index column, bool ended) const {
+  const Index rows = positions.all().rows(), period = weights_.size() / 4 + 1;
+  const Index seen = std::min(rows, std::max<Index>(kFewestSeen, period));
+  const double* x = positions.all().col(column).data();
+  Bends out;
+  if (positions.begin() == 0) out.first = bend_of(x, 1, seen);
+  if (ended) out.last = bend_of(x + rows - 1, -1, seen);
+  return out;
+}
+
 void Stretch::filter(bool ended) {
   const Index half = weights_.size() / 2;
   const Index reached = ended ? even_.end() : std::max<Index>(0, even_.end() - half);
-  const Index rows = even_.all().rows(), seen = std::min(rows, std::max<Index>(1, half / 2) + 1);
-  // A joint that speeds up at an end does so beyond it: mirrored alone it would run on evenly.
-  const auto bends_of = [&](const double* q) {
-    Bends out;
-    if (even_.begin() == 0) out.first = bend_of(q, 1, seen);
-    if (ended) out.last = bend_of(q + rows - 1, -1, seen);
-    return out;
-  };
+  const Index rows = even_.all().rows();
   const auto filtered_to = [&](RowWindow* out, Index first_column, Index stride, bool are_positions) {
     const Index first = out->end(), end = std::max(first, (reached + stride - 1) / stride);
     MatrixXd more(end - first, joints_);
     for (Index j = 0; j < joints_ && end > first; ++j) {
       const double* x = even_.all().col(first_column + j).data();
       filter_column(x, rows, weights_, stride, first - even_.begin() / stride, end - first, more.col(j).data(),
-                    are_positions ? bends_of(x) : Bends{});
+                    are_positions ? bends_of(even_, first_column + j, ended) : Bends{});
     }
     out->append(more);
   };
@@ -201,7 +206,7 @@ void Stretch::add_motion_between(bool ended) {
     const SplineBetween spline(static_cast<double>(part) / static_cast<double>(between_), step_);
     const Index count = (end - part + between_ - 1) / between_;
     for (Index j = 0; j < joints_; ++j) {
-      const MatrixXd values = spline.at(q.col(j), first - smooth_.begin(), count);
+      const MatrixXd values = spline.at(q.col(j), first - smooth_.begin(), count, bends_of(smooth_, j, ended));
       for (Index d = 0; d < 3; ++d)
         for (Index i = 0; i < count; ++i) more(i * between_ + part, d * joints_ + j) = values(i, d);
     }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "dynamics/filter.hpp"
 #include "dynamics/prepare.hpp"
 #include "rooms.hpp"
 
@@ -52,6 +53,7 @@ class Stretch {
 
  private:
   void resample(bool ended);
+  Bends bends_of(const RowWindow& positions, Eigen::Index column, bool ended) const;
   void filter(bool ended);
   void add_motion(bool ended);
   void add_motion_between(bool ended);

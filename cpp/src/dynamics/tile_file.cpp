@@ -71,6 +71,7 @@ bool TileFile::add(const Tile& tile) {
   place.joints = motion.q.cols();
   place.stride = tile.stride;
   place.between = tile.between;
+  place.means = tile.means;
   place.first = tile.first;
   place.count = tile.count;
   place.weights = tile.weights.size();
@@ -100,6 +101,7 @@ Tile TileFile::read(std::size_t number, const Robot& robot) const {
   out.number = number;
   out.stride = place.stride;
   out.between = place.between;
+  out.means = place.means;
   out.first = place.first;
   out.count = place.count;
   out.weights.resize(place.weights);

@@ -37,6 +37,7 @@ class TileFile {
     std::size_t begin = 0, numbers = 0;
     double step = 0.0;
     Eigen::Index rows = 0, joints = 0, stride = 0, between = 1, first = 0, count = 0, weights = 0;
+    bool means = false;
     std::vector<std::string> columns;
   };
 

@@ -64,8 +64,8 @@ Recording make(std::string name, const ArrayLike& time, const ArrayLike& positio
                const std::optional<ArrayLike>& speed, const std::optional<ArrayLike>& torque,
                const std::optional<ArrayLike>& current, const std::optional<ArrayLike>& command,
                const std::optional<ArrayLike>& speed_command, const std::optional<ArrayLike>& torque_command,
-               const std::map<std::string, ArrayLike>& columns, bool test, const std::optional<ReadPieces>& pieces,
-               double end) {
+               const std::map<std::string, ArrayLike>& columns, bool torque_is_mean, bool test,
+               const std::optional<ReadPieces>& pieces, double end) {
   Recording out;
   out.name = std::move(name);
   out.time = vector_of(time, "time");
@@ -84,6 +84,7 @@ Recording make(std::string name, const ArrayLike& time, const ArrayLike& positio
                                   std::to_string(rows));
     out.columns.emplace(key, std::move(column));
   }
+  out.torque_is_mean = torque_is_mean;
   out.test = test;
   if (pieces) out.read = Pieces{held(py::object(*pieces))};
   out.end = end;
@@ -140,7 +141,8 @@ Raises InputError naming the array when shapes or types do not fit; `validate_re
           py::arg("speed") = py::none(), py::arg("torque") = py::none(), py::arg("current") = py::none(),
           py::arg("command") = py::none(), py::arg("speed_command") = py::none(),
           py::arg("torque_command") = py::none(), py::arg("columns") = std::map<std::string, ArrayLike>{},
-          py::arg("test") = false, py::arg("pieces") = py::none(), py::arg("end") = 0.0);
+          py::arg("torque_is_mean") = false, py::arg("test") = false, py::arg("pieces") = py::none(),
+          py::arg("end") = 0.0);
   define_read_only_attributes(cls, {"columns"});
   cls.def_property_readonly("columns", &columns_of,
                             "Shape=(n,) each, by name: 'payload_kg', 'temp1_C' … or 'temp_C', 'volt_V', 'enabled', and "
@@ -151,7 +153,7 @@ Raises InputError naming the array when shapes or types do not fit; `validate_re
   cls.def("__len__", &Recording::rows);
   cls.def("__repr__", [](const Recording& recording) { return repr(recording); });
   define_value(cls, {"name", "time", "position", "speed", "torque", "current", "command", "speed_command",
-                     "torque_command", "columns", "test", "pieces", "end"});
+                     "torque_command", "columns", "torque_is_mean", "test", "pieces", "end"});
 
   m.def("validate_recording", py::overload_cast<const Recording&, const Robot&>(&validate), py::arg("recording"),
         py::arg("robot"), py::call_guard<py::gil_scoped_release>(),

@@ -48,7 +48,8 @@ def with_rows(
     fields: dict[str, Any] = {name: table[kept] for name, table in tables.items() if table.shape[1]}
     columns = {name: np.asarray(values)[kept] for name, values in recording.columns.items()}
     time = np.asarray(recording.time)[kept]
-    return _core.Recording(recording.name, time=time, columns=columns, test=recording.test, **fields)
+    fields |= {"columns": columns, "torque_is_mean": recording.torque_is_mean, "test": recording.test}
+    return _core.Recording(recording.name, time=time, **fields)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@
 
 #include <doctest/doctest.h>
 
+#include "dynamics/filter.hpp"
 #include "dynamics/prepare.hpp"
 #include "dynamics/tile_file.hpp"
 #include "math/random.hpp"
@@ -213,7 +214,7 @@ TEST_CASE("between rows that are far apart lies a smooth curve, and the filter s
   const std::vector<dynamics::Tile> tiles = tiles_of(slow, robot);
   REQUIRE(tiles.size() > 4);
   for (const dynamics::Tile& tile : tiles) {
-    CHECK(tile.motion.step == doctest::Approx(0.125 / 12.0));
+    CHECK(tile.motion.step == doctest::Approx(0.125 / 25.0));
     const Eigen::VectorXd time = tile.own_time();
     const Eigen::VectorXd expected =
         tile.own_rows(tile.motion.time.unaryExpr([&](double t) { return torque(std::round(t * 1e6) * 1e-6); }));
@@ -232,6 +233,39 @@ TEST_CASE("between rows that are far apart lies a smooth curve, and the filter s
     CHECK(read[k].motion.qdd == tiles[k].motion.qdd);
     CHECK(read[k].measured == tiles[k].measured);
   }
+}
+
+TEST_CASE("where torques are means over the time of a row, the filter sees the means of what is between the rows") {
+  const auto parabola = [](double k) { return 1.0 + 0.5 * k + k * k; };
+  for (const Eigen::Index between : {2, 3, 4, 5}) {
+    Eigen::VectorXd steps(10 * between + 1);
+    for (Eigen::Index k = 0; k < steps.size(); ++k) steps[k] = parabola(static_cast<double>(k));
+    const Eigen::VectorXd means = dynamics::means_of_rows(steps.data(), steps.size(), between);
+    REQUIRE(means.size() == 11);
+    CHECK(means[0] == steps[0]);
+    CHECK(means[10] == steps[10 * between]);
+    for (Eigen::Index row = 1; row < 10; ++row) {
+      // The trapezoidal rule has w^2 / 12 + h^2 / 6 of the parabola, the midpoint rule w^2 / 12 - h^2 / 12.
+      const double width = static_cast<double>(between), rest = between % 2 == 0 ? 1.0 / 6.0 : -1.0 / 12.0;
+      const double mean = parabola(static_cast<double>(row * between)) + width * width / 12.0 + rest;
+      CHECK(means[row] == doctest::Approx(mean).epsilon(1e-12));
+    }
+  }
+
+  Recording slow = recording(30.0);
+  slow.position = slow.position.topRows(200).eval();
+  slow.torque = slow.torque.topRows(200).eval();
+  slow.columns.clear();
+  slow.time = Eigen::VectorXd::LinSpaced(200, 0.0, 199 * 0.04);
+  const dynamics::Tile at_instants = tiles_of(slow, swung::level_arm()).front();
+  slow.torque_is_mean = true;
+  const dynamics::Tile of_means = tiles_of(slow, swung::level_arm()).front();
+  REQUIRE(of_means.between == 8);
+  const Eigen::VectorXd turning = (of_means.motion.time.array() * 5.0).sin().sign();
+  const Eigen::VectorXd means = dynamics::means_of_rows(turning.data(), turning.size(), 8);
+  const Eigen::VectorXd seen = of_means.own_rows(turning);
+  CHECK(seen == dynamics::filtered(means, of_means.weights).middleRows(of_means.first / 8, of_means.count));
+  CHECK((seen - at_instants.own_rows(turning)).cwiseAbs().maxCoeff() > 0.05);
 }
 
 TEST_CASE("times that go backwards from one piece to the next are refused") {

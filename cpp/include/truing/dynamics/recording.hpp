@@ -35,6 +35,9 @@ struct Recording {
   Eigen::MatrixXd torque_command;  ///< shape=(n, joints) [Nm | N] torques commanded, if they were recorded
   /// shape=(n,) each, by name: 'payload_kg', 'temp1_C' … or 'temp_C', 'volt_V', 'enabled', and one's own.
   std::map<std::string, Eigen::VectorXd> columns;
+  /// Torques and currents are means over the time of a row, which is in its middle, and not values at its instant: of
+  /// rows that are more than 12 ms apart, as nearer ones show no difference.
+  bool torque_is_mean = false;
   bool test = false;  ///< held out: it is judged on, and never fitted to
   /// Of a recording that is longer than memory: begins to read it, as often as it is called. The tables above are then
   /// its first rows.

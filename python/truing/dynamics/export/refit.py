@@ -106,7 +106,8 @@ def _rows(recording: _core.Recording, rows: NDArray[np.intp], number: int) -> _c
     parts: dict[str, Any] = {
         name: table[rows] for name, table in whole.items() if table.shape[0] == n and table.size
     }
-    return _core.Recording(f"{recording.name} {number}", **parts, columns=columns)
+    parts |= {"columns": columns, "torque_is_mean": recording.torque_is_mean}
+    return _core.Recording(f"{recording.name} {number}", **parts)
 
 
 def fit_without(

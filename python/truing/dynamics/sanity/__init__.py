@@ -37,6 +37,7 @@ from truing.dynamics.sanity.findings import (
 from truing.dynamics.sanity.grids import Grid, gaps_of, grids_of
 from truing.dynamics.sanity.known_load import known_load
 from truing.dynamics.sanity.readings import readings
+from truing.dynamics.sanity.row_means import row_means
 from truing.dynamics.sanity.scales import constants_by_masses, gain_unknown, scales
 from truing.dynamics.sanity.speeds import speeds
 from truing.dynamics.sanity.switched import Switched, thinned
@@ -132,6 +133,9 @@ def _by_model(robot: _core.Robot, recordings: list[_core.Recording], grids: list
         found = [*lengths.of_another_robot(robot, free, read.fit), *found]
     if unknown:
         found.append(gain_unknown(robot, read.fit, unknown))
+    elif not any(one.mistake for one in found):
+        more, recordings = row_means(robot, recordings)
+        found += more
     return _Held(robot, recordings, grids, found)
 
 

@@ -16,13 +16,14 @@ from truing import _core
 from truing.dynamics.recorded import driven_joints, of_all_rows, with_rows
 from truing.dynamics.sanity.columns import resolution
 from truing.dynamics.sanity.findings import RecordingFinding, listed
-from truing.dynamics.sanity.grids import FAR_APART, STILL, usual_step
+from truing.dynamics.sanity.grids import STILL, usual_step
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 TURN = 2.0 * np.pi
 NEAR_A_TURN = 0.5  # [rad] by which a step may miss a whole turn
+CLOSE = 0.024  # [s] between rows: between such no motion goes there and back
 WINDOW = 5  # rows whose median a row is held against: two wrong ones in a row are seen
 FAR = 20.0  # times what nine in ten rows are off it
 PART = 0.1  # of a torque's range, without the outermost hundredth at each end
@@ -96,8 +97,7 @@ def without_spikes(
     found: list[RecordingFinding] = []
     out = []
     for recording in recordings:
-        # Between rows that are far apart a motion may well go there and back.
-        near = usual_step(np.asarray(recording.time)) <= FAR_APART
+        near = usual_step(np.asarray(recording.time)) <= CLOSE
         spiked = _spikes_of(robot, recording) if near else []
         if spiked:
             recording = of_all_rows(recording, partial(_without_spikes, robot))
