@@ -125,7 +125,8 @@ def apply_programs(
     """Programs with literal targets replaced by what to command.
 
     nominal: the robot as its controller believes it to be. real: as it was calibrated. The frame after the
-    last link of both is the controller's flange, their base its robot base. progress: called with targets
+    last link of both is the controller's flange, their base its robot base; of a URDF it is the nominal
+    robot's tip link, which stands in both on the last joint's link alike. progress: called with targets
     done. Raises InputError where no file can be used, and for robots that are not of six joints.
     """
     options = options or ApplyOptions()
@@ -174,8 +175,8 @@ class _Robots:
         self.options = options
         conditions = self.conditions(np.zeros(JOINTS, dtype=int))
         self.compensator = Compensator(
-            _at_flange(nominal),
-            _at_flange(real),
+            _at_flange(nominal, _last_to_flange(nominal)),
+            _at_flange(real, _last_to_flange(nominal)),
             CompensateOptions(inverse=inverse, in_base=True),
             conditions,
         )
@@ -218,9 +219,16 @@ class _Robots:
         return found
 
 
-def _at_flange(robot: Robot) -> Robot:
+def _last_to_flange(nominal: Robot) -> Floats:
+    """shape=(4, 4) [m] the flange in the frame after the last joint. A URDF is read up to its tip link, whose
+    fixed joints the robot has as the place of its target.
+    """
+    return np.array(nominal.targets[0].T_last_target) if nominal.convention == "urdf" else np.eye(4)
+
+
+def _at_flange(robot: Robot, T_last_flange: Floats) -> Robot:
     """The robot with its flange as its only target, in its own base."""
-    flange = RobotTarget(robot.targets[0].name, np.eye(4))
+    flange = RobotTarget(robot.targets[0].name, T_last_flange)
     return robot.replace(targets=[flange], T_measurement_base=np.eye(4))
 
 

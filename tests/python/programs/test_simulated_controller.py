@@ -19,6 +19,7 @@ from program_robots import built, nominal
 from truing.files.brand_frames import numbers_from_frame
 from truing.files.programs import Given
 from truing.inverse_kinematics import InverseOptions, InverseSolver, Task
+from truing.model import Target
 from truing.programs import ApplyOptions, apply_programs
 
 BRANDS = ("kuka", "abb", "fanuc", "yaskawa", "ur")
@@ -109,6 +110,38 @@ def test_the_built_robot_reaches_what_the_program_wants(brand: str, tmp_path: Pa
     # What the report promises is what happens.
     for one, (position, rotation) in zip(outcome.targets, missed, strict=True):
         assert one.after == pytest.approx((position, rotation), abs=2e-8)
+
+
+def test_the_flange_of_a_urdf_is_its_tip_link(tmp_path: Path) -> None:
+    """URDFs of arms end in a fixed joint to tool0. The calibrated robot has its measured reflector there."""
+    path, joints, wanted = write_program(tmp_path, "kuka", seed=11)
+    arm = nominal("kuka")
+    tip = Target("tool0", np.asarray(arm.joints[-1].T_parent_joint))
+    believed = arm.replace(joints=arm.joints[:-1], targets=[tip])
+    random = np.random.default_rng(12)
+    links = []
+    for joint in believed.joints:
+        T = np.array(joint.T_parent_joint)
+        T[:3, 3] += random.normal(0.0, 1e-3, 3)
+        links.append(joint.replace(T_parent_joint=T))
+    real = believed.replace(joints=links)
+    reflector = np.eye(4)
+    reflector[:3, 3] = 0.1, 0.02, 0.05
+    measured = real.replace(targets=[Target("reflector", reflector)])
+    outcome = apply_programs([path], believed, measured, ApplyOptions(given("kuka")))
+    assert [one.status for one in outcome.targets] == ["changed"] * COUNT
+
+    command_joints, command_poses = texts.read_back("kuka", outcome.files[path].decode("latin-1"))
+    controller, robot = InverseSolver(arm), InverseSolver(real)
+    commands = [np.radians(q) for q in command_joints]
+    for q, T in zip(joints[BY_JOINTS:], command_poses, strict=True):
+        flange = frame_of("kuka") @ T @ np.linalg.inv(texts.T_FLANGE_TOOL)
+        commands.append(np.asarray(controller.solve(Task(flange), q).joints))
+    missed = [
+        difference(robot.forward(q) @ texts.T_FLANGE_TOOL, T)[0]
+        for q, T in zip(commands, wanted, strict=True)
+    ]
+    assert max(missed) < 4e-6
 
 
 @pytest.mark.parametrize("brand", BRANDS)
