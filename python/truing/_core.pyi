@@ -4429,7 +4429,8 @@ class PathOptions:
     longest_slide = 0.25: [m] the same of a prismatic joint.
     rolls = 24: Samples of a torch's roll, where it is free.
     rail_places = 5: Samples of each rail before the arm, over what it can be reached from.
-    smoothing = 20: Smoothing iterations of the path, where the task leaves degrees of freedom.
+    smoothing = 20: Smoothing iterations of the path, where the task leaves degrees of freedom; up to ten times as many
+        while a step is longer than allowed.
     """
     def __init__(self, *, longest_turn: typing.SupportsFloat | typing.SupportsIndex = 0.3490658503988659, longest_slide: typing.SupportsFloat | typing.SupportsIndex = 0.25, rolls: typing.SupportsInt | typing.SupportsIndex = 24, rail_places: typing.SupportsInt | typing.SupportsIndex = 5, smoothing: typing.SupportsInt | typing.SupportsIndex = 20) -> None:
         ...
@@ -4480,7 +4481,8 @@ class PathOptions:
     @property
     def smoothing(self) -> int:
         """
-        Smoothing iterations of the path, where the task leaves degrees of freedom.
+        Smoothing iterations of the path, where the task leaves degrees of freedom; up to ten times as many
+        while a step is longer than allowed.
         """
     @smoothing.setter
     def smoothing(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:

@@ -255,7 +255,8 @@ class PathKeywords(TypedDict, total=False):
     rail_places: int
     """Samples of each rail before the arm, over what it can be reached from."""
     smoothing: int
-    """Smoothing iterations of the path, where the task leaves degrees of freedom."""
+    """Smoothing iterations of the path, where the task leaves degrees of freedom; up to ten times as many
+    while a step is longer than allowed."""
 
 class TorqueKeywords(TypedDict, total=False):
     effects: Effects

@@ -147,7 +147,9 @@ struct PathOptions {
   double longest_slide = 0.25;  ///< [m] the same of a prismatic joint
   int rolls = 24;               ///< samples of a torch's roll, where it is free
   int rail_places = 5;          ///< samples of each rail before the arm, over what it can be reached from
-  int smoothing = 20;           ///< smoothing iterations of the path, where the task leaves degrees of freedom
+  /// Smoothing iterations of the path, where the task leaves degrees of freedom; up to ten times as many while a step
+  /// is longer than allowed.
+  int smoothing = 20;
 
   /// False, and why, when an option makes no sense.
   bool is_valid(std::string* error) const;

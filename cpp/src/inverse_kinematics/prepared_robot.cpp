@@ -84,6 +84,7 @@ PreparedRobot::PreparedRobot(const Robot& robot, const InverseOptions& o, const 
       closed(arm, o),
       surroundings(o.scene.empty() ? Surroundings() : Surroundings(o.scene, arm)) {
   golden_steps(arm.driven(), seed_step);
+  for (int j = 0; j < arm.driven(); ++j) turn[j] = whole_turn(*this, j);
 }
 
 double distance2(const PreparedRobot& robot, const double* a, const double* b) {
@@ -123,7 +124,7 @@ double whole_turn(const PreparedRobot& robot, int joint) {
 
 void bring_near(const PreparedRobot& robot, const double* seed, double* readings) {
   for (int j = 0; j < robot.driven(); ++j) {
-    const double turn = whole_turn(robot, j);
+    const double turn = robot.turn[j];
     if (turn > 0.0) readings[j] += turn * std::floor((seed[j] - readings[j]) / turn + 0.5);
   }
 }

@@ -32,6 +32,7 @@ struct PreparedRobot {
   const Scales scales;
   const ClosedForm closed;
   const Surroundings surroundings;
+  double turn[kMaxDrivenJoints];       ///< whole_turn of each joint
   double seed_step[kMaxDrivenJoints];  ///< of the sequence of seeds that restarts begin from, as fractions of a range
 
   int driven() const { return arm.driven(); }

@@ -371,6 +371,47 @@ def test_a_path_does_not_jump() -> None:
             assert np.abs(path.solutions.joints - joints).max() < 1e-4
 
 
+@pytest.mark.parametrize("kind", ["pose", "torch"])
+def test_a_path_that_needs_more_than_a_turn_begins_at_the_turn_that_lets_it(kind: str) -> None:
+    """Half of J6's range lies a turn away from the seed."""
+    robot = irb()
+    solver = InverseSolver(robot)
+    joints = np.tile([0.2, 0.1, -0.2, 0.3, 0.9, 0.0], (200, 1))
+    joints[:, 5] = np.linspace(0.98 * robot.joints[5].lower, 0.98 * robot.joints[5].upper, 200)
+    wanted = poses_of(solver, joints)
+    path = truing.inverse_path(robot, wanted, kind=kind)
+    assert path.continuous and path.solutions.reached.all()
+    check(robot, path.solutions, wanted, kind)
+    if kind == "pose":
+        assert path.longest_turn == pytest.approx(np.abs(np.diff(joints, axis=0)).max(), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["pose", "torch", "point"])
+@pytest.mark.parametrize("axes", [6, 7])
+def test_paths_of_arms_without_closed_form_are_followed_from_target_to_target(axes: int, kind: str) -> None:
+    """Poses on smooth motions of random chains: seeds that are tried anew at every target lie elsewhere."""
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        links = [
+            truing.Joint(
+                f"J{k + 1}",
+                d=random.choice([0.0, 0.3, 0.4]),
+                a=random.choice([0.0, 0.1, 0.3]),
+                alpha=random.choice([-0.5, 0.5]) * math.pi,
+                lower=-2.6,
+                upper=2.6,
+            )
+            for k in range(axes)
+        ]
+        robot = truing.Robot("chain", joints=links)
+        phase = 2 * math.pi * (np.linspace(0.0, 1.0, 81)[:, None] + random.random(axes))
+        middle, swing = random.uniform(-1.4, 1.4, axes), random.uniform(0.3, 0.9, axes)
+        wanted = poses_of(InverseSolver(robot), middle + swing * np.sin(phase))
+        path = truing.inverse_path(robot, wanted, kind=kind)
+        assert path.continuous, (seed, [(gap.start, gap.step) for gap in path.gaps])
+        check(robot, path.solutions, wanted, kind)
+
+
 def test_a_gap_is_told_where_no_path_is() -> None:
     robot = irb()
     solver = InverseSolver(robot)
