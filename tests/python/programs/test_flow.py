@@ -6,6 +6,7 @@ not known, and the target stays.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -134,3 +135,33 @@ def test_a_base_that_a_routine_sets_to_the_world_is_its_callers(tmp_path: Path) 
 def test_why_a_tool_is_not_known_is_said_behind_loops_as_well(krl: Callable[[str], Reading]) -> None:
     found = heights(krl("FDAT_ACT=FP1\nFOR I=1 TO 3\nMOVE\nENDFOR\nMOVE\nEND\n"))
     assert {str(why) for why in found.values()} == {"FDAT_ACT is set to what is not in the files given: FP1"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        (
+            "open.script",
+            f"def f():\n  movel({UR_POINT})\n  movel({UR_POINT[:-1]}, a=1.2)\nend\n",
+            "line 3: .* do not close in pairs, expected",
+        ),
+        ("cut.script", f"def f():\n  movel({UR_POINT})\n  movel(p[0.5,0.2", "line 3: .* do not close"),
+        (
+            "tool.script",
+            f"def f():\n  set_tcp(p[0,0,0.1,0,0,0)\n  movel({UR_POINT})\nend\n",
+            "line 2: .* do not close",
+        ),
+        (
+            "cut.mod",
+            "MODULE m\nPROC main()\nMoveAbsJ [[0,0,0,0,9,0],[9E9]],v9,fine,tool0;\nMoveL [[9",
+            "line 4: .*no ; follows, expected one",
+        ),
+    ],
+)
+def test_a_move_that_does_not_end_is_refused(tmp_path: Path, name: str, text: str, expected: str) -> None:
+    """It was passed over without a word: the target not corrected, or the tool not set."""
+    path = tmp_path / name
+    path.write_text(text, encoding="ascii")
+    readings, refused = read_programs([path], Given())
+    assert not readings
+    assert re.search(expected, refused[0].message)

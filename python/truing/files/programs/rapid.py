@@ -207,6 +207,12 @@ class _Rapid:
             line_start = max(code.rfind("\n", 0, match.start()), code.rfind("\r", 0, match.start()), 0)
             before = code[max(line_start, code.rfind(";", 0, match.start())) : match.start()]
             end = code.find(";", match.end())
+            if end < 0 and match[1].lower() in _MOVES and _STARTS.search(before or "\n"):
+                said = self.reading.sources[source]
+                raise InputError(
+                    f"{said.path}, line {said.line(match.start())}: {said.shown(match.start(), len(code))}:"
+                    " no ; follows, expected one after the move: write the program anew if it was cut off"
+                )
             if end < 0 or not _STARTS.search(before or "\n") or ":=" in code[match.end() : match.end() + 3]:
                 continue
             if re.match(r"\s*[:(]", code[match.end() : end]):

@@ -152,7 +152,14 @@ class _Script:
         """kinds: of the routines and blocks around. moves: take the targets; else only follow the tool."""
         if match["move"]:
             end = closing(self.code, match.end())
-            if end is not None and (moves or match["move"] == "set_tcp"):
+            if end is None:
+                source = self.reading.sources[0]
+                shown = source.shown(match.start(), _end_of_line(self.code, match.start()))
+                raise InputError(
+                    f"{source.path}, line {source.line(match.start())}: {shown}: brackets do not close in"
+                    " pairs, expected ( [ ] ): mend the line, or write the program anew if it was cut off"
+                )
+            if moves or match["move"] == "set_tcp":
                 self._call(match, end, flow)
         elif match["opens"]:
             kinds.append("routine")
