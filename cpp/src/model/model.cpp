@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -154,6 +155,35 @@ void add_request(Model* model, const EffectRequest& request, const Measurements&
   }
 }
 
+/// Names of the values that effects have: their parameters, and constants of their laws. `owner`: of one request; -1:
+/// of all.
+std::set<std::string> effect_values(const Model& model, int owner) {
+  std::set<std::string> names;
+  for (const ParameterInfo& info : model.parameters) {
+    if (info.role != Role::effect || (owner >= 0 && info.owner != owner)) continue;
+    names.insert(info.name);
+    for (const ColumnTerm& column : info.columns) {
+      for (const auto& [name, value] : model.terms[column.term].constants) names.insert(name);
+    }
+  }
+  return names;
+}
+
+/// Every value that the robot's effects carry is one that a law looks at: a misspelt one would do nothing.
+void require_known_values(const Model& model) {
+  const std::set<std::string> known = effect_values(model, -1);
+  for (std::size_t k = 0; k < model.robot.effects.size(); ++k) {
+    const AppliedEffect& applied = model.robot.effects[k];
+    for (const auto& [name, value] : applied.parameters) {
+      if (known.count(name)) continue;
+      std::string has;
+      for (const std::string& own : effect_values(model, static_cast<int>(k))) has += (has.empty() ? "" : ", ") + own;
+      throw std::invalid_argument("effect '" + applied.effect + "' has a value '" + name +
+                                  "', which its law does not look at; it has " + (has.empty() ? "none here" : has));
+    }
+  }
+}
+
 double* geometry_value(Joint* joint, const std::string& name) {
   if (name == "theta") return &joint->theta;
   if (name == "d") return &joint->d;
@@ -240,6 +270,7 @@ Model make_model(const Robot& robot, const Measurements& data, const std::vector
   }
 
   for (const AppliedEffect& applied : robot.effects) add_request(&model, {applied.effect, applied.joints}, data, own);
+  require_known_values(model);
   for (const EffectRequest& request : requests) add_request(&model, request, data, own);
   return model;
 }

@@ -239,6 +239,21 @@ def test_an_effect_of_ones_own_is_refused_by_name() -> None:
         InverseSolver(robot)
 
 
+@pytest.mark.parametrize(
+    ("effect", "value"),
+    [
+        ("harmonic", "harmonic.J2.cos3"),  # there are cos1 and cos2
+        ("backlash", "backlash.J3"),  # of another joint than the effect's
+        ("neighbour_coupling", "neighbour_coupling.J2.J9"),
+    ],
+)
+def test_a_value_that_no_law_looks_at_is_refused_by_name(effect: str, value: str) -> None:
+    """It would do nothing, in a robot file written by hand."""
+    robot = irb().replace(effects=[AppliedEffect(effect, ["J2"], {value: 1e-3})])
+    with pytest.raises(truing.InputError, match=rf"'{value}'.*does not look at; it has {effect}\.J2"):
+        InverseSolver(robot)
+
+
 # ---- What other tools get wrong ------------------------------------------------------------------
 
 
