@@ -44,6 +44,8 @@ _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _FEWEST_VIEWS = 3
 _FEWEST_POINTS = 6  # of a ChArUco board: fewer do not fix its pose well
 _CALIBRATION_VIEWS = 40  # more add little to intrinsics that are refined later
+_CALIBRATION_STEPS = 1000  # OpenCV stops at 30, and does not say so; wide lenses take hundreds
+_OTHER_STARTS = (0.6, 1.2)  # focal lengths over the image's width, where OpenCV's own start leads nowhere
 _TRIED = 4  # images in which another board is looked for
 _SAMPLES = 7  # grey values along a square
 # A pixel is nothing like this far off where the board is the one that was named.
@@ -993,16 +995,27 @@ def _calibrate(
     objects = [np.ascontiguousarray(points[k], dtype=np.float32).reshape(-1, 1, 3) for k in chosen]
     seen = [np.ascontiguousarray(pixels[k], dtype=np.float32).reshape(-1, 1, 2) for k in chosen]
     flags = cv.CALIB_FIX_K3 if len(chosen) < 10 else 0  # it bends what few images do not hold
+    enough = (cv.TERM_CRITERIA_EPS | cv.TERM_CRITERIA_MAX_ITER, _CALIBRATION_STEPS, 1e-12)
+
+    def fit(start: Floats | None, more: int = 0) -> Any:
+        lens = None if start is None else np.zeros(5)
+        return cv.calibrateCameraExtended(
+            objects, seen, size, start, lens, flags=flags | more, criteria=enough
+        )
+
     # OpenCV adds up what its threads did in the order in which they are done: on one the bits are the same
     # every time. Corners are found by as many as there are, each in a part of its own.
     threads = cv.getNumThreads()
     cv.setNumThreads(1)
     try:
-        rms, matrix, distortion, turns, _, sigma, _, _ = cv.calibrateCameraExtended(
-            objects, seen, size, None, None, flags=flags
-        )
+        best = fit(None)
+        for ratio in _OTHER_STARTS if not best[0] < _WORTH_A_LOOK else ():
+            focal, middle = ratio * size[0], (0.5 * (size[0] - 1), 0.5 * (size[1] - 1))
+            start = np.array([[focal, 0, middle[0]], [0, focal, middle[1]], [0, 0, 1.0]])
+            best = min(best, fit(start, cv.CALIB_USE_INTRINSIC_GUESS), key=lambda found: found[0])
     finally:
         cv.setNumThreads(threads)
+    rms, matrix, distortion, turns, _, sigma, _, _ = best
     coefficients = np.zeros(5)
     coefficients[: min(5, np.size(distortion))] = np.asarray(distortion).ravel()[:5]
     camera = Camera(
