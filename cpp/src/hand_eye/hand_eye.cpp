@@ -38,6 +38,7 @@ constexpr double kHopeless = 0.2;  // and beyond this nothing is said
 constexpr double kWidest = 0.1;    // standard errors beyond this fraction of the distance, or rad, are not an answer
 constexpr double kExact = 1e-8;    // [m], [rad] closures below this are rounding, not noise
 constexpr double kBeyondPixels = 3.0;  // times what pixels can tell of a board's orientation: more is not theirs
+constexpr double kEvidence = 4.0;      // and log likelihood over a robot that turns by what is seen: less is the robot
 constexpr double kBentLens = 1.2;  // a lens whose pixels scatter with no more than this times the variance fits as well
 constexpr int kRejectRounds = 10;
 constexpr double kCertainScale = 4.0;  // standard errors from 1: a factor on the board's lengths is said
@@ -286,13 +287,19 @@ double scatter_beyond_pixels(const LoopProblem& problem, const Rows& rows, const
   return std::sqrt(noise.variance[2] / median_of(by_pixels));
 }
 
-/// Then lens, board or shutter are not what was given for the pixels: their noise is no measure, and the loop's own
-/// stands.
-bool beyond_pixels(const LoopProblem& problem, const Rows& rows, const LoopNoise& noise, HandEyeResult* result) {
-  const double times = scatter_beyond_pixels(problem, rows, noise);
-  if (times < kBeyondPixels) return false;
-  warn(result, {HandEyeConcernKind::beyond_pixels, std::sqrt(noise.variance[2]), times});
-  return true;
+/// The same poses where boards turn by no more than their pixels can tell: all else is the robot's.
+LoopEstimate fit_by_pixels_noise(const HandEyeOptions& options, const Work& work) {
+  LoopNoise noise = work.fit.noise;
+  noise.variance[2] = kExact * kExact, noise.estimate[2] = false;
+  return refine_loop(work.problem, work.fitted, work.fit.X, work.fit.Y, noise, options.max_iterations);
+}
+
+/// Lens, board or shutter are not what was given for the pixels, whose noise then is no measure. A robot that turns
+/// looks alike where the board is near the hand: what it explains as well is taken for the robot's.
+bool scatters_beyond_pixels(const Work& work, const LoopEstimate& by_pixels) {
+  return scatter_beyond_pixels(work.problem, work.fitted, work.fit.noise) >= kBeyondPixels &&
+         restricted_likelihood(work.problem, work.fitted, work.fit) >
+             restricted_likelihood(work.problem, work.fitted, by_pixels) + kEvidence;
 }
 
 /// Pixels and all robot poses at once; the closures then with the camera as found.
@@ -321,7 +328,7 @@ void refine_lens(const HandEyeOptions& options, Work* work, HandEyeResult* resul
   fit_images(options, work, result);
   work->fit =
       refine_loop(work->problem, work->fitted, work->fit.X, work->fit.Y, work->fit.noise, options.max_iterations);
-  if (scatter_beyond_pixels(work->problem, work->fitted, work->fit.noise) < kBeyondPixels ||
+  if (!scatters_beyond_pixels(*work, fit_by_pixels_noise(options, *work)) ||
       before.fit.noise.variance[3] > kBentLens * work->fit.noise.variance[3])
     return;
   *work = before;
@@ -561,8 +568,15 @@ bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, c
 /// Pixels are what was measured, where they scatter as they say.
 void use_images(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
   if (options.refine_camera) refine_lens(options, work, result);
-  if (beyond_pixels(work->problem, work->fitted, work->fit.noise, result)) return;
+  const LoopEstimate by_pixels = fit_by_pixels_noise(options, *work);
+  if (scatters_beyond_pixels(*work, by_pixels)) {  // the loop's own noise stands
+    const LoopNoise& noise = work->fit.noise;
+    warn(result, {HandEyeConcernKind::beyond_pixels, std::sqrt(noise.variance[2]),
+                  scatter_beyond_pixels(work->problem, work->fitted, noise)});
+    return;
+  }
   work->by_pixels = true;
+  work->fit = by_pixels;  // hands turn by all that pixels do not explain
   fit_images(options, work, result);
 }
 

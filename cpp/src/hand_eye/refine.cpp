@@ -113,6 +113,14 @@ LoopSums sum_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Iso
   return s;
 }
 
+/// Of a positive definite matrix, by unit diagonal.
+template <int N>
+double log_determinant(const Eigen::Matrix<double, N, N>& M) {
+  const Eigen::Matrix<double, N, 1> unit = unit_scale<N>(M);
+  return symmetric_eigen<Eigen::Dynamic>(scaled_both<N>(unit, M)).values.array().max(1e-300).log().sum() -
+         2.0 * unit.array().log().sum();
+}
+
 /// Inverse of the information, by unit diagonal; false where it has none.
 bool invert(const Matrix12d& N, Matrix12d* C) {
   const Vector12d unit = unit_scale<12>(N);
@@ -224,6 +232,13 @@ LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eig
   out.converged = ended.reason == StopReason::settled;
   out.singular = ended.reason == StopReason::singular;
   return out;
+}
+
+double restricted_likelihood(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit) {
+  const LoopSums sums = sum_loop(problem, rows, fit.X, fit.Y, fit.noise, false);
+  double twice = sums.chi2 + log_determinant(sums.N);
+  for (const std::size_t i : rows) twice += log_determinant(loop_row(problem, i, fit.X, fit.Y, fit.noise).V);
+  return -0.5 * twice;
 }
 
 NoiseShapes noise_shapes(const LoopProblem& problem, std::size_t i, const Eigen::Isometry3d& X,

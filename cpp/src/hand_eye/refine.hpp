@@ -65,6 +65,10 @@ struct LoopEstimate {
 LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eigen::Isometry3d& X,
                          const Eigen::Isometry3d& Y, LoopNoise noise, int max_iterations);
 
+/// Logarithm of the restricted likelihood of the noise at `fit`, but for a constant: what the noise that was found has
+/// over another is the difference.
+double restricted_likelihood(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit);
+
 /// Spread [log of variance] of the weak prior that keeps what data cannot split near an even split.
 constexpr double kPriorSpread = 3.0;
 
