@@ -20,9 +20,11 @@ constexpr double kSpreadTime = 300.0;  // over which the spread of the averages 
 constexpr double kWarmUp = 10.0;       // after a start, and while the filter settles on a shift, nothing is flagged [s]
 constexpr double kPart = 0.8;          // thresholds of equal probability: three degrees of freedom against six
 constexpr int kBehind = 8;             // samples that an onset and a jump are judged by
-constexpr double kStaticTime = 30.0;   // over which the deviation from forward kinematics is averaged [s]
-constexpr double kCorrelation = 1.0;   // time of that deviation [s]
-constexpr double kSure = 5.0;          // logarithm of odds
+constexpr int kLasting = 4;            // newest samples that have to show a jump still
+constexpr double kGone = 25.0;  // whitened squares by which these are nearer to no jump: it was a burst of outliers
+constexpr double kStaticTime = 30.0;  // over which the deviation from forward kinematics is averaged [s]
+constexpr double kCorrelation = 1.0;  // time of that deviation [s]
+constexpr double kSure = 5.0;         // logarithm of odds
 
 Vector6d log_frame(const Isometry3d& T) {
   Vector6d out;
@@ -37,8 +39,12 @@ ShiftWatch::ShiftWatch(const TrackSetup& setup, const WatchOptions& options) : s
 }
 
 void ShiftWatch::restart() {
-  for (Average& average : averages_) average.mean.setZero();
+  forget();
   quiet_ = 0.0;
+}
+
+void ShiftWatch::forget() {
+  for (Average& average : averages_) average.mean.setZero();
   level_ = 0.0;
   pending_ = 0;
 }
@@ -60,6 +66,7 @@ void ShiftWatch::push(const PoseGrade& grade, const Isometry3d* T_base_flange) {
   now.kept = Matrix6d::Identity();
   if (grade.accepted) now.kept -= solve_factored<6, 6>(factor, grade.S - Matrix6d(grade.R.asDiagonal())).transpose();
   now.u = whitened<6, 1>(factor, grade.innovation);
+  now.weight = grade.S.diagonal().cwiseInverse();
   if (now.u.norm() > kClip) now.u *= kClip / now.u.norm();
   rejected_ = grade.accepted ? 0 : rejected_ + 1;
   quiet_ += seconds;
@@ -143,11 +150,27 @@ Vector6d ShiftWatch::find_jump(std::int64_t onset) const {
   return solve_symmetric<6, 1>(normal, right);
 }
 
+/// Whether the newest samples still see what the updates have left of the jump: a station that was moved stays there,
+/// reflected signals come back.
+bool ShiftWatch::lasts(std::int64_t onset, const Vector6d& jump) const {
+  Vector6d left = jump;
+  double nearer = 0.0;
+  for (std::int64_t k = onset; k < count_; ++k) {
+    if (k >= count_ - kLasting) {
+      const Vector6d weight = row(k).weight;
+      nearer += weight.dot((row(k).innovation - left).cwiseAbs2() - row(k).innovation.cwiseAbs2());
+    }
+    left = row(k).kept * left;
+  }
+  return nearer < kGone;
+}
+
 void ShiftWatch::flag() {
   const std::int64_t onset = find_onset();
   const Row& first = row(onset);
   const Vector6d jump = find_jump(onset);
   const double position = jump.head<3>().norm(), rotation = jump.tail<3>().norm();
+  if (!lasts(onset, jump)) return forget();
   if (position < options_.least * first.noise[0] && rotation < options_.least * first.noise[1]) {
     restart();  // what is smaller than the noise of a sample is no jump: the filter does not know all
     return;

@@ -38,6 +38,7 @@ class ShiftWatch {
   struct Row {
     double t = 0.0;
     Vector6d u, innovation;
+    Vector6d weight;  ///< inverse variances that were expected of the innovation
     Matrix6d kept;
     std::array<double, 2> noise{};  ///< of the tracker [m], [rad]
     Eigen::Isometry3d T_base_receiver;
@@ -47,6 +48,8 @@ class ShiftWatch {
 
   const Row& row(std::int64_t k) const { return rows_[static_cast<std::size_t>(k) % rows_.size()]; }
   void average(const Vector6d& u, double seconds);
+  void forget();
+  bool lasts(std::int64_t onset, const Vector6d& jump) const;
   void learn_deviation(const Row& row);
   void flag();
   std::int64_t find_onset() const;

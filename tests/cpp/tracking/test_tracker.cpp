@@ -859,6 +859,18 @@ TEST_CASE("gross outliers are not taken for a shift: seed 15") {
   CHECK(watch(s, 1e9).before == 0);
 }
 
+TEST_CASE("bursts of reflected signals, up to seven samples long, are not taken for a shift: seeds 15 to 18") {
+  for (std::uint64_t seed = 15; seed <= 18; ++seed) {
+    SimulatedStreams s = simulate_streams(large_boom(), watched(seed, 35.0));
+    math::Random random(seed);
+    for (std::size_t k = 150; k + 8 < s.tracker.size(); k += 90) {
+      const Vector3d way = 0.15 * Vector3d(random.normal(), random.normal(), random.normal());
+      for (std::size_t i = k; i < k + 2 + k % 6; ++i) s.tracker[i].position += way;
+    }
+    CHECK(watch(s, 1e9).before == 0);
+  }
+}
+
 TEST_CASE("corrections keep their rate and jerk whatever is wanted: 300 runs of steps and sways, seed 1") {
   math::Random random(1);
   const CorrectionLimits limits;
