@@ -53,6 +53,10 @@ _BAD_PIXELS = 2.0
 _BAD_SHARE = 0.003  # of the image's width
 _WORTH_A_LOOK = 0.5  # [px] a camera whose rms is below fits well enough to start from
 _LEAST_TILT = math.radians(8)
+_MISPLACED = 6.0  # times the usual error of points, in all images and in its own, and no less than
+_LEAST_MISPLACED = 0.2  # [px]
+_MISPLACED_ROUNDS = 5  # what is far off hides what is less
+_MOST_MISPLACED = 0.2  # of the points of an image: where more are off, it is not single ones that are
 _MOST_PIXELS = 200_000_000
 _LARGEST_RATIO = 1e4  # of focal length and image size
 
@@ -980,6 +984,39 @@ def _pose(cv: Any, points: Floats, pixels: Floats, camera: Camera) -> tuple[Floa
     return frame, best
 
 
+def _poses(
+    cv: Any, points: Sequence[Floats], pixels: Sequence[Floats], camera: Camera
+) -> tuple[list[Floats], Floats]:
+    """Of all images: poses of the board, and their rms [px]."""
+    found = [_pose(cv, p, seen, camera) for p, seen in zip(points, pixels, strict=True)]
+    return [frame for frame, _ in found], np.array([rms for _, rms in found])
+
+
+def _well_placed(
+    cv: Any, points: Sequence[Floats], pixels: Sequence[Floats], frames: Sequence[Floats], camera: Camera
+) -> list[NDArray[np.bool_]]:
+    """Which points are where the others of their image have them. A corner between small squares may be drawn
+    to the edge of a marker: one that is off by a pixel bends pose and lens by more than all others tell.
+    """
+    matrix, distortion = _matrix(camera)
+    off = []
+    for object_points, seen, frame in zip(points, pixels, frames, strict=True):
+        turn, shift = cv.Rodrigues(frame[:3, :3])[0], frame[:3, 3]
+        predicted, _ = cv.projectPoints(object_points, turn, shift, matrix, distortion)
+        off.append(np.linalg.norm(np.asarray(predicted).reshape(-1, 2) - seen, axis=1))
+    usual = float(np.median(np.concatenate(off)))
+    limits = [max(_LEAST_MISPLACED, _MISPLACED * max(usual, float(np.median(one)))) for one in off]
+    right = [one <= limit for one, limit in zip(off, limits, strict=True)]
+    return [
+        mask if (~mask).mean() <= _MOST_MISPLACED and mask.sum() >= _FEWEST_POINTS else np.ones_like(mask)
+        for mask in right
+    ]
+
+
+def _chosen(values: Sequence[Floats], masks: Sequence[NDArray[np.bool_]]) -> list[Floats]:
+    return [one[mask] for one, mask in zip(values, masks, strict=True)]
+
+
 def _orthonormal(rotation: Floats) -> Floats:
     u, _, vt = np.linalg.svd(rotation)
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
@@ -1036,6 +1073,29 @@ def _calibrate(
     )
 
 
+def _calibrated(
+    cv: Any, points: Sequence[Floats], pixels: Sequence[Floats], size: tuple[int, int]
+) -> tuple[Camera, float]:
+    """The camera and its rms [px]; raises InputError where the images do not hold it."""
+    try:
+        camera, rms, focal = _calibrate(cv, points, pixels, size)
+    except cv.error as error:
+        raise InputError(
+            "the camera's values cannot be found from these images"
+            f" ({str(error).strip().splitlines()[-1][:120]}): give --camera, or images with the board"
+            " tilted by 20 to 40 degrees about different axes"
+        ) from None
+    if not math.isfinite(rms) or plausible_camera(camera) is not None or not focal < 0.1:
+        raise InputError(
+            "the camera's values cannot be found from these images: the focal length came out as"
+            f" {camera.fx:.4g} px"
+            + (f" ± {focal * camera.fx:.2g}" if math.isfinite(focal) else ", but no board is tilted")
+            + ". "
+            "Tilt the board against the camera by 20 to 40 degrees about different axes, or give --camera"
+        )
+    return camera, rms
+
+
 def _with_poses(
     cv: Any,
     board: Board,
@@ -1053,30 +1113,18 @@ def _with_poses(
     calibration_rms = math.nan
     limit = max(_BAD_PIXELS, _BAD_SHARE * size[0])
     if camera is None:
-        try:
-            camera, calibration_rms, focal = _calibrate(cv, points, pixels, size)
-        except cv.error as error:
-            raise InputError(
-                "the camera's values cannot be found from these images"
-                f" ({str(error).strip().splitlines()[-1][:120]}): give --camera, or images with the board"
-                " tilted by 20 to 40 degrees about different axes"
-            ) from None
-        if not math.isfinite(calibration_rms) or plausible_camera(camera) is not None or not focal < 0.1:
-            raise InputError(
-                "the camera's values cannot be found from these images: the focal length came out as"
-                f" {camera.fx:.4g} px"
-                + (f" ± {focal * camera.fx:.2g}" if math.isfinite(focal) else ", but no board is tilted")
-                + ". "
-                "Tilt the board against the camera by 20 to 40 degrees about different axes, or give --camera"
-            )
+        camera, calibration_rms = _calibrated(cv, points, pixels, size)
         if calibration_rms > limit:
             raise InputError(_bad_fit(cv, images, called, found, board, calibration_rms))
-    frames, rms = [], []
-    for object_points, seen in zip(points, pixels, strict=True):
-        frame, off = _pose(cv, object_points, seen, camera)
-        frames.append(frame)
-        rms.append(off)
-    errors = np.array(rms)
+    frames, errors = _poses(cv, points, pixels, camera)
+    for _ in range(_MISPLACED_ROUNDS):
+        right = _well_placed(cv, points, pixels, frames, camera)
+        if all(mask.all() for mask in right):
+            break
+        points, pixels = _chosen(points, right), _chosen(pixels, right)
+        if not given:
+            camera, calibration_rms, _ = _calibrate(cv, points, pixels, size)
+        frames, errors = _poses(cv, points, pixels, camera)
     usual = float(np.median(errors))
     if given and usual > _WORTH_A_LOOK:
         try:

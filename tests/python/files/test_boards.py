@@ -18,7 +18,7 @@ import pytest
 import truing
 from board_images import CAMERA, Floats, board_poses, frame, render, write_images
 from truing import InputError, InputWarning
-from truing.files import Board, find_board, parse_board
+from truing.files import Board, boards, find_board, parse_board
 from truing.files.boards import _calibrate, plausible_camera
 from truing.hand_eye import Camera
 
@@ -220,6 +220,28 @@ def test_a_lens_that_bends_much_is_found_to_the_end() -> None:
     camera, rms, _ = _calibrate(cv2, [points] * len(pixels), pixels, (1600, 1200))
     assert rms < 0.2
     assert [camera.fx, camera.fy] == pytest.approx([990, 990], rel=0.03)
+
+
+def test_a_corner_that_is_far_from_where_the_others_have_it_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    board = parse_board("charuco:5x7:40mm:30mm:5X5_50")
+    images = [render(board, T, seed=k) for k, T in enumerate(board_poses(board, 6, seed=2))]
+    clean = find_board(images, board)
+    find = boards._Finder._charuco
+
+    def misplace(finder: Any, grey: Any) -> Any:
+        points, pixels = find(finder, grey)
+        if (grey == images[2]).all():
+            pixels[5] += 3.0
+        return points, pixels
+
+    monkeypatch.setattr(boards._Finder, "_charuco", misplace)
+    views = find_board(images, board)
+    counts = [len(points) for points in views.points]
+    assert counts == [len(points) - (k == 2) for k, points in enumerate(clean.points)]
+    assert views.calibration_rms < 1.05 * clean.calibration_rms
+    assert views.camera.fx == pytest.approx(clean.camera.fx, rel=2e-3)
 
 
 def test_images_without_the_board_are_listed(tmp_path: Path) -> None:
