@@ -48,6 +48,7 @@ _LEAST_DRIFT = 5e-5  # [s/s] what is less the filter finds by itself
 _TUNED_FOR, _SETTLING = 0.04, 3.0  # [s]
 _FACTORS, _TRACKER_FACTORS = (1.0, 3.0, 10.0, 30.0, 100.0), (1.0, 3.0)
 _STATIC_TIMES = (1.0, 0.5, 0.2, 0.1)  # [s]
+_LEANING = 0.2  # [rad] gravity by the inertial sensor and by encoders: no sway, sag or bias makes so much
 _CLEAR = 0.2  # another reading of the numbers has to be so much better before it is named
 
 
@@ -176,6 +177,7 @@ def check_streams(
     t = joints.t - setup.controller_clock_offset
     _require_overlap("joints", joints, t, imu)
     _check_gyro(imu, t, flange)
+    _check_imu_axes(setup, imu, t, flange)
     if tracker is not None:
         _require_overlap("tracker", tracker, tracker.t - setup.clock_offset, imu)
         _check_tracker(setup, tracker, t, flange)
@@ -207,6 +209,26 @@ def _check_gyro(imu: ImuData, t: Floats, flange: Floats) -> None:
         raise InputError(
             f"{imu.path}, column 'gx_rad_s': the rates are {measured / told:.3g} times those of the joints:"
             " these look like deg/s, expected rad/s"
+        )
+
+
+def _check_imu_axes(setup: _core.TrackSetup, imu: ImuData, t: Floats, flange: Floats) -> None:
+    """The sensor's axes against those of the set-up: where is up, on the average over the recording? Sway and
+    acceleration cancel in it.
+    """
+    rows = _spread_out(len(imu.t))
+    rows = rows[(imu.t[rows] >= t[0]) & (imu.t[rows] <= t[-1])]
+    near = np.clip(np.searchsorted(t, imu.t[rows]), 0, len(t) - 1)
+    R = flange[near][:, :3, :3] @ np.asarray(setup.T_flange_imu)[:3, :3]
+    up = -np.asarray(setup.gravity) / np.linalg.norm(setup.gravity)
+
+    mean = np.einsum("nij,nj->i", R, imu.accel[rows])
+    usual = float(np.arccos(np.clip(mean @ up / max(1e-9, float(np.linalg.norm(mean))), -1, 1)))
+    if usual > _LEANING:
+        raise InputError(
+            f"{imu.path}, column 'ax_m_s2': at the mean of the recording the sensor feels gravity"
+            f" {np.degrees(usual):.3g} deg from where encoders and T_flange_imu of the set-up have it: are"
+            " the sensor's axes those of the set-up? `truing track calibrate` finds them"
         )
 
 

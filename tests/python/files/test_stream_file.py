@@ -300,6 +300,17 @@ def _replace(data: Any, **changes: Any) -> Any:
             r"column 'gx_rad_s': the rates are .* times those of the joints: these look like deg/s",
         ),
         (
+            lambda p: {
+                **p,
+                "imu": _replace(
+                    p["imu"],
+                    gyro=p["imu"].gyro[:, [0, 2, 1]] * [1, 1, -1],
+                    accel=p["imu"].accel[:, [0, 2, 1]] * [1, 1, -1],
+                ),
+            },
+            r"column 'ax_m_s2': .* deg from where encoders and T_flange_imu of the set-up have it",
+        ),
+        (
             lambda p: {**p, "tracker": _replace(p["tracker"], t=p["tracker"].t + 1000)},
             r"expected streams of the same time; is the clock offset in the set-up file right\?",
         ),
