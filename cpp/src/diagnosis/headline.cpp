@@ -71,7 +71,8 @@ static std::string in_words(const Cause& cause) {
   if (!cause.only || cause.only->confounded_with.empty()) return text;
   const Alternative& other = cause.only->confounded_with[0];
   if (other.probability > 0.0 && other.probability >= kContender * cause.only->probability)
-    text += " (or " + effect_at(other.effect, other.joints) + ": these data cannot tell)";
+    text += " (or " + (other.joints == cause.joints ? plain(other.effect) : effect_at(other.effect, other.joints)) +
+            ": these data cannot tell)";
   return text;
 }
 

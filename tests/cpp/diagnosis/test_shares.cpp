@@ -127,6 +127,8 @@ TEST_CASE("the headline names the three largest causes, an effect at several joi
   CHECK(largest_causes(d) == "joint compliance at J2");  // nine to one is no question
   d.effects[0].confounded_with[0].probability = 0.4;
   CHECK(largest_causes(d) == "joint compliance at J2 (or harmonic at J3: these data cannot tell)");
+  d.effects[0].confounded_with[0].joints = {"J2"};
+  CHECK(largest_causes(d) == "joint compliance at J2 (or harmonic: these data cannot tell)");
 }
 
 TEST_CASE("where poses are too few the sentence says which single effects they would show") {
