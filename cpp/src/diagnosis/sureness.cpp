@@ -57,14 +57,17 @@ class Contest {
         evidence_(evidence),
         group_(state.choice.groups[at]),
         less_(evidence.evaluate(without(state.choice, groups_, at))),
+        making_room_(evidence.evaluate_at(state.sigma2, less_.choice)),
         theta_(solution_of(state, mine())),
         loss_(state.score - less_.score),
+        loss_making_room_(state.score - making_room_.score),
         gained_(less_.rss - state.rss),
         like_geometry_(looks_like_geometry(work, name())) {}
 
   double removal_loss() const { return loss_; }
   const Evidence::State& less() const { return less_; }
   std::vector<Evidence::Gain> gains() const { return evidence_.gains(less_); }
+  std::vector<Evidence::Gain> gains_making_room() const { return evidence_.gains(making_room_); }
 
   bool is_rival(int group) const {
     const Explanation& e = named_[static_cast<std::size_t>(group)];
@@ -76,10 +79,11 @@ class Contest {
            !same_name(e, name()) && !contains(e, name()) && std::find(in.begin(), in.end(), group) == in.end();
   }
 
-  Rival rival(const Evidence::Gain& gain) const {
+  /// `room`: the same group's, where others make room. It may ask for less of them, or for more: the better one counts.
+  Rival rival(const Evidence::Gain& gain, const Evidence::Gain& room) const {
     Rival out;
     out.group = gain.group;
-    out.loss = loss_ - gain.score;
+    out.loss = std::min(loss_ - gain.score, loss_making_room_ - room.score);
     const bool any_geometry = named_[static_cast<std::size_t>(gain.group)].kind == Kind::all_geometry;
     if (gain.squares > 0.5 * gained_ || (any_geometry && like_geometry_)) out.r2 = explained(gain);
     // What can make the same motion is named with it, even where the last per cents speak for one of them: no law is
@@ -106,9 +110,11 @@ class Contest {
   const Evidence& evidence_;
   int group_;
   Evidence::State less_;
+  Evidence::State making_room_;  ///< the same, where others do what they do beside whatever takes the group's place
   Eigen::VectorXd theta_;
-  double loss_;    ///< of score, without the group [nats]
-  double gained_;  ///< fall of the sum of squares with it
+  double loss_;              ///< of score, without the group [nats]
+  double loss_making_room_;  ///< the same of `making_room_`, which a rival is to win back
+  double gained_;            ///< fall of the sum of squares with it
   bool like_geometry_;
 };
 
@@ -213,9 +219,11 @@ Sureness how_sure(const Work& work, const Evidence& evidence, const Evidence::St
                         is_shape_as_good(work, evidence, state, contest, group);
   out.law_is_part = is_law_part(work, evidence, state, contest, group);
   double all = 1.0 + std::exp(-kTempered * std::max(0.0, out.removal_loss)), of_class = 1.0;
-  for (const Evidence::Gain& gain : contest.gains()) {
+  const std::vector<Evidence::Gain> gains = contest.gains(), making_room = contest.gains_making_room();
+  for (std::size_t g = 0; g < gains.size(); ++g) {
+    const Evidence::Gain& gain = gains[g];
     if (!contest.is_rival(gain.group)) continue;
-    const Rival rival = contest.rival(gain);
+    const Rival rival = contest.rival(gain, making_room[g]);
     const bool shadow = work.design.candidates.groups[static_cast<std::size_t>(gain.group)].shadow;
     const double weight = shadow ? 0.0 : std::exp(-kTempered * std::max(0.0, rival.loss));
     all += weight;

@@ -287,7 +287,7 @@ Eigen::VectorXd Evidence::rest(const std::vector<int>& columns) const {
 
 // log p(y) = -nu/2 log(y^T y - m^T X^T y) - 1/2 log|X^T X + s^2 P| + 1/2 log|s^2 P| (MacKay 1992, eq. 4.10, with the
 // noise variance s^2 at its most probable value).
-Evidence::State Evidence::evaluate(const Choice& choice) const {
+Evidence::State Evidence::evaluate(const Choice& choice, double sigma2, int rounds) const {
   State out;
   out.choice = choice;
   out.columns = nuisance_;
@@ -308,9 +308,9 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
   const Eigen::VectorXd xy = rest(own);
   const double yy = eliminated_ == 0 ? gram_.yy : rest_yy_;
   out.precision.resize(p);
-  out.sigma2 = gram_.yy / std::max(1.0, gram_.n);
+  out.sigma2 = sigma2;
   double log_prior = 0.0;
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     Eigen::MatrixXd d = xx;
     log_prior = 0.0;
     for (Eigen::Index k = 0; k < p; ++k) {
@@ -323,9 +323,9 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
     out.factor = factorised(std::move(d));
     out.solution = out.factor.solve(xy);
     out.rss = std::max(yy - xy.dot(out.solution), 1e-12 * gram_.yy + 1e-300);
-    const double sigma2 = out.rss / degrees_of_freedom_;
-    const bool settled = std::abs(sigma2 / out.sigma2 - 1.0) < 1e-3;
-    out.sigma2 = sigma2;
+    const double left = out.rss / degrees_of_freedom_;
+    const bool settled = std::abs(left / out.sigma2 - 1.0) < 1e-3;
+    out.sigma2 = left;
     if (settled) break;
   }
   out.evidence = -0.5 * degrees_of_freedom_ * std::log(out.rss) - 0.5 * log_determinant(out.factor) + 0.5 * log_prior;
@@ -340,6 +340,17 @@ Evidence::State Evidence::evaluate(const Choice& choice) const {
     out.solution << always, others;
   }
   out.score = out.evidence - cost;
+  return out;
+}
+
+Evidence::State Evidence::evaluate(const Choice& choice) const {
+  constexpr int kMostRounds = 12;
+  return evaluate(choice, gram_.yy / std::max(1.0, gram_.n), kMostRounds);
+}
+
+Evidence::State Evidence::evaluate_at(double sigma2, const Choice& choice) const {
+  State out = evaluate(choice, sigma2, 1);
+  out.sigma2 = sigma2;  // where gains begin to look for theirs
   return out;
 }
 

@@ -120,6 +120,10 @@ class Evidence {
   };
 
   State evaluate(const Choice& choice) const;
+  /// The same with the variance of noise given, against which priors count: `score` is comparable with that of choices
+  /// which leave as much. What a group is to take the place of is evaluated so: at the noise that is left without
+  /// either, priors would hold the other groups back from making room for it.
+  State evaluate_at(double sigma2, const Choice& choice) const;
 
   /// Before several threads ask side by side for gains of this choice, and of parts of it. No number depends on it.
   void keep_rest(const Choice& choice) const;
@@ -172,6 +176,8 @@ class Evidence {
   double degrees_of_freedom() const { return degrees_of_freedom_; }
 
  private:
+  /// `sigma2` of priors, for so many rounds as its most probable value takes to settle.
+  State evaluate(const Choice& choice, double sigma2, int rounds) const;
   struct Projected;
   Projected project(const State& state, int threads = 1) const;
   /// Of the columns that State::factor is of.

@@ -696,6 +696,28 @@ TEST_CASE("diagnose takes a first axis of a DH robot that tilts, wherever its ba
   CHECK(d.after.rms < 2.0 * d.noise_floor);
 }
 
+TEST_CASE("an eccentric last joint is about as likely as the tilting axis that moves the tip alike") {
+  const auto is_one_of_both = [](const auto& e) {
+    return (e.effect == "harmonic" || e.effect == "axis_wobble_twice") && e.joints == std::vector<std::string>{"J6"};
+  };
+  for (const unsigned seed : {860u, 861u}) {  // of the first the tilt is named, of the second one the eccentric joint
+    Robot truth = perturbed(light_arm(), 1e-3, 2e-3, seed);
+    truth.effects = {{"harmonic", {"J6"}, {{"harmonic.J6.cos1", 2.4e-3}, {"harmonic.J6.sin1", 1.8e-3}}}};
+    truth.T_measurement_base = somewhere();
+    const auto table = random_joints(truth, 200, seed + 1);
+    measure(table.get(), truth, What::position, 7e-6, seed + 2);
+    const Diagnosis d = diagnose(light_arm(), table->data);
+    CAPTURE(seed);
+    INFO(names(d));
+    const auto named = std::find_if(d.effects.begin(), d.effects.end(), is_one_of_both);
+    REQUIRE(named != d.effects.end());
+    const auto& others = named->confounded_with;
+    const auto other = std::find_if(others.begin(), others.end(), is_one_of_both);
+    REQUIRE(other != others.end());
+    CHECK(other->probability > 0.25 * named->probability);
+  }
+}
+
 TEST_CASE("diagnose sees that a target has slipped on the last link") {
   Robot truth = light_arm();
   auto table = measured(truth, 160, 805);

@@ -383,3 +383,25 @@ TEST_CASE("what is always in may be eliminated once: every answer stays") {
           doctest::Approx(rest.null_scores(b, 5, 103, 1).back()).epsilon(1e-9));
   }
 }
+
+TEST_CASE("what other groups make room for is won at the noise that it leaves, not at the noise without it") {
+  const Eigen::Index rows = 200;
+  Eigen::MatrixXd x(rows, 9);
+  x.leftCols(8) = random_matrix(rows, 8, 71);
+  x.col(8) = x.col(7) + 0.03 * x.middleCols(1, 6).rowwise().sum();  // the same motion, if the six give way
+  const Eigen::VectorXd y = 3.0 * x.col(7) + 0.1 * random_matrix(rows, 1, 72);
+  const std::vector<ColumnGroup> groups = {{{1, 2, 3, 4, 5, 6}}, {{7}}, {{8}}};
+  const Gram gram = gram_of(x, y);
+  const Evidence evidence(gram, groups, {0}, Eigen::VectorXd::Ones(9));
+  const Evidence::State found = evidence.evaluate({{0, 1}, {0.1, 1.0}}),
+                        other = evidence.evaluate({{0, 2}, {0.1, 1.0}}), without = evidence.evaluate({{0}, {0.1}}),
+                        at_noise = evidence.evaluate_at(found.sigma2, without.choice);
+  const auto score_with = [&](const Evidence::State& rest, int group) {
+    return rest.score + evidence.gain(rest, groups[static_cast<std::size_t>(group)].columns, 0.0).score;
+  };
+  CHECK(at_noise.choice.groups == without.choice.groups);
+  CHECK(score_with(at_noise, 1) == doctest::Approx(found.score).scale(1.0).epsilon(0.05));
+  CHECK(score_with(at_noise, 2) == doctest::Approx(other.score).scale(1.0).epsilon(0.05));
+  CHECK(found.score - other.score < 5.0);
+  CHECK(score_with(without, 2) < other.score - 20.0);
+}
