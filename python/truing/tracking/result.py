@@ -28,6 +28,7 @@ from truing.report.json_text import to_json, without_nan
 from truing.rotations import interpolated, rotation_vectors
 from truing.tracking.api import TrackCalibration
 from truing.tracking.page import Replayed, calibration_report, run_report
+from truing.tracking.uncertainty import tool_covariance
 
 RUN_FORMAT = "truing-track-run/1"
 CALIBRATION_FORMAT = "truing-track-calibration/1"
@@ -120,7 +121,7 @@ def against_truth(run: Played) -> dict[str, Any] | None:
             rotation_vectors(true[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2)),
         ]
     )
-    P = rows["covariance"][use].reshape(-1, 6, 6)
+    P = tool_covariance(run.where, predicted, rows["covariance"][use].reshape(-1, 6, 6))
     nees = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[:, :, None])[:, :, 0])
     inside = np.abs(e) <= 3 * np.sqrt(np.einsum("nii->ni", P))
     uncorrected = np.linalg.norm(true[:, :3, 3] - rows["T_base_tool_planned"][use][:, :3, 3], axis=1)
@@ -256,7 +257,8 @@ def compensation_columns(run: Played) -> dict[str, Any]:
     def known(values: Floats) -> Floats:
         return np.where(made, values, np.nan)
 
-    sigma = np.sqrt(np.einsum("nii->ni", rows["covariance"].reshape(-1, 6, 6)))
+    covariance = tool_covariance(run.where, rows["T_base_tool"], rows["covariance"].reshape(-1, 6, 6))
+    sigma = np.sqrt(np.einsum("nii->ni", covariance))
     columns: dict[str, Any] = {"t_s": rows["t"], "plan_t_s": run.plan_t, "made_s": known(rows["made_at"])}
     columns |= {name: known(values) for name, values in pose_columns(rows["T_base_tool"]).items()}
     columns |= {f"d{name}": known(rows["correction"][:, k]) for k, name in enumerate(MOTIONS)}
