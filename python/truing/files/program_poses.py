@@ -34,6 +34,13 @@ def counts_j3_from_horizon(brand: Brand, robot: _core.Robot) -> bool:
     return not any(name == driven[1] for joint in robot.joints for name, _ in joint.driven_by)
 
 
+def last_to_flange(robot: _core.Robot) -> Floats:
+    """shape=(4, 4) [m] the controller's flange in the frame after the last joint. A URDF is read up to its
+    tip link, whose fixed joints the robot has as the place of its target.
+    """
+    return np.array(robot.targets[0].T_last_target) if robot.convention == "urdf" else np.eye(4)
+
+
 def is_program(path: Path) -> bool:
     """Whether a file is a robot program. Many things are called .dat: of KUKA's DEFDAT says so."""
     if not has_program_name(path) or path.suffix.lower() != ".dat":
@@ -188,7 +195,8 @@ def wanted_poses(path: Path, robot: _core.Robot, *, in_base: bool) -> tuple[Floa
                 InputWarning,
                 stacklevel=3,
             )
-        end = np.eye(4) if as_tools else np.asarray(robot.targets[0].T_last_target)
+        T_flange_target = np.linalg.inv(last_to_flange(robot)) @ robot.targets[0].T_last_target
+        end = np.eye(4) if as_tools else T_flange_target
         found |= {id(t): T_measurement_base @ T @ end for t, T in zip(by_poses.targets, frames, strict=True)}
     wanted = np.array([found[id(target)] for target in program.targets])
     if in_base:

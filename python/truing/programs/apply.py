@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from truing.errors import InputError
 from truing.files.brand_frames import NOTATIONS, Brand, frame_from_numbers, numbers_from_frame
-from truing.files.program_poses import counts_j3_from_horizon
+from truing.files.program_poses import counts_j3_from_horizon, last_to_flange
 from truing.files.programs import Given, Number, Reading, Stay, Target, edited, printed, read_programs
 from truing.inverse_kinematics import (
     CompensateOptions,
@@ -175,8 +175,8 @@ class _Robots:
         self.options = options
         conditions = self.conditions(np.zeros(JOINTS, dtype=int))
         self.compensator = Compensator(
-            _at_flange(nominal, _last_to_flange(nominal)),
-            _at_flange(real, _last_to_flange(nominal)),
+            _at_flange(nominal, last_to_flange(nominal)),
+            _at_flange(real, last_to_flange(nominal)),
             CompensateOptions(inverse=inverse, in_base=True),
             conditions,
         )
@@ -217,13 +217,6 @@ class _Robots:
                 choices.append(inside if bounded else [angle])
             found += [np.array(way) for way in itertools.product(*choices)]
         return found
-
-
-def _last_to_flange(nominal: Robot) -> Floats:
-    """shape=(4, 4) [m] the flange in the frame after the last joint. A URDF is read up to its tip link, whose
-    fixed joints the robot has as the place of its target.
-    """
-    return np.array(nominal.targets[0].T_last_target) if nominal.convention == "urdf" else np.eye(4)
 
 
 def _at_flange(robot: Robot, T_last_flange: Floats) -> Robot:

@@ -37,6 +37,20 @@ def test_ik_takes_a_program_of_poses_and_joints() -> None:
     assert np.allclose(data.tasks[1].T_measurement_target, wanted, atol=1e-12)
 
 
+def test_the_flange_of_a_urdf_is_its_tip_link() -> None:
+    """As `apply` has it. URDFs of arms end in a fixed joint, which is no joint of the robot."""
+    arm = nominal("kuka")
+    believed = arm.replace(
+        joints=arm.joints[:-1], targets=[Target("tool0", np.asarray(arm.joints[-1].T_parent_joint))]
+    )
+    wanted = []
+    for robot in (arm, believed):
+        with pytest.warns(InputWarning, match="a relative move"):
+            data = truing.load_targets(CORPUS / "kuka_inline.src", robot)
+        wanted.append([task.T_measurement_target for task in data.tasks])
+    assert np.allclose(wanted[0], wanted[1], atol=1e-12)
+
+
 def test_a_tool_that_is_not_known_is_the_robots_own() -> None:
     robot = nominal("fanuc")
     with pytest.warns(InputWarning, match="tool is not known: taken to be"):
