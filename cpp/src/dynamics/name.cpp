@@ -532,6 +532,22 @@ double mean_percent(const TorqueErrors& errors) {
   return std::exp(logs / std::max(n, 1.0));
 }
 
+/// " (or …: these recordings cannot tell)" of a cause at one joint, where another is not much less likely.
+std::string or_else(const FoundTorqueEffect& found, std::size_t joints) {
+  constexpr double kContender = 0.25;  // of the cause's probability
+  const auto less = [](const TorqueAlternative& a, const TorqueAlternative& b) {
+    return a.probability < b.probability;
+  };
+  const auto other = std::max_element(found.confounded_with.begin(), found.confounded_with.end(), less);
+  if (found.joints.size() > 1 || other == found.confounded_with.end() ||
+      other->probability < kContender * found.probability)
+    return "";
+  std::string name = other->effect;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  const std::string where = other->joints == found.joints ? "" : at_joints(other->joints, joints);
+  return " (or " + name + where + ": these recordings cannot tell)";
+}
+
 /// What was found, in plain words; and how many more.
 std::string causes_of(const std::vector<FoundTorqueEffect>& effects, std::size_t joints) {
   std::string text;
@@ -542,7 +558,7 @@ std::string causes_of(const std::vector<FoundTorqueEffect>& effects, std::size_t
       ++more;
       continue;
     }
-    text += (text.empty() ? "" : "; ") + e.plain + at_joints(e.joints, joints);
+    text += (text.empty() ? "" : "; ") + e.plain + at_joints(e.joints, joints) + or_else(e, joints);
   }
   return more > 0 ? text + "; and " + std::to_string(more) + " more" : text;
 }

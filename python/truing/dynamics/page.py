@@ -29,6 +29,7 @@ NOMINAL, UNKNOWN = "#98a2ad", "#8a5bb5"
 HEAT = [[0, "#ffffff"], [0.25, "#fdf0d5"], [0.5, "#f6bd60"], [0.75, "#dd6b2f"], [1, "#8f1d1d"]]
 CAUSES = 3  # that the headline names
 FEW = 2  # joints of a cause that the headline names, of more their number
+CONTENDER = 0.25  # of a cause's probability: another that is as likely is named with it
 ROOM = 115  # characters of the causes in a headline of two lines
 LONG = 75  # characters of a headline in large type
 POINTS = 3000  # of a line, over time
@@ -290,9 +291,18 @@ def _cause(group: Sequence[Mapping[str, Any]], few: int) -> str:
     if group[0]["effect"] == "coupling":
         return f"{plain(group[0])} ({group[0]['joints'][1]} on {group[0]['joints'][0]})"
     joints = [joint for effect in group for joint in effect["joints"]]
-    if not joints:
-        return plain(group[0])
-    return f"{plain(group[0])} ({', '.join(joints) if len(joints) <= few else f'{len(joints)} joints'})"
+    other = _or_else(group[0]) if len(group) == 1 and len(joints) <= 1 else ""
+    where = ", ".join(joints) if len(joints) <= few else f"{len(joints)} joints"
+    return plain(group[0]) + (f" ({where})" if joints else "") + other
+
+
+def _or_else(effect: Mapping[str, Any]) -> str:
+    """Another cause that is not much less likely."""
+    other = max(effect["confounded_with"], key=lambda one: float(one["probability"]), default=None)
+    if other is None or other["probability"] < CONTENDER * effect["probability"]:
+        return ""
+    where = f" ({', '.join(other['joints'])})" if other["joints"] not in ([], effect["joints"]) else ""
+    return f" or {other['effect'].replace('_', ' ')}{where}: these recordings cannot tell"
 
 
 def _kicker(command: str, result: Mapping[str, Any], recordings: int, badge: str = "") -> str:

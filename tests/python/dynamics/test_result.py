@@ -278,6 +278,8 @@ def test_the_headline_holds_in_two_lines_whatever_joints_are_called() -> None:
             "joints": [joint],
             "standard": False,
             "share": share,
+            "probability": 0.9,
+            "confounded_with": [],
             "sentence": f"{words} at {joint}: 1 +- 0.1 Nm",
         }
 
@@ -291,6 +293,20 @@ def test_the_headline_holds_in_two_lines_whatever_joints_are_called() -> None:
     assert said == "friction that grows with the load (2 joints); inertia of the motor's rotor (3 joints)"
     reversal = cause("presliding", names[2], 0.05, "Friction that builds up after a reversal")
     assert len(causes_in_words({"effects": [*load, *rotors, reversal]})) <= ROOM
+
+
+@pytest.mark.parametrize(("seed", "told"), [(31, False), (32, True)])
+def test_the_headline_says_what_a_cause_cannot_be_told_from(seed: int, told: bool, tmp_path: Path) -> None:
+    """A load at the flange, or a last link that is heavier: of few seconds the two are alike."""
+    load = {"payload.m": 2.0, "payload.mx": 0.0, "payload.my": 0.0, "payload.mz": 0.2}
+    simulated = simulate_motion(seed=seed, seconds=12.0, hidden={"payload": ([], load)})
+    found = diagnose(simulated.nominal, simulated.recordings)
+    result = write_diagnosis(tmp_path, found, simulated.recordings)
+    text = visible((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert ("(or payload: these recordings cannot tell)" in result["sentence"]) != told
+    assert ("(J6) or payload: these recordings cannot tell" in text) != told
+    (cause,) = [effect for effect in result["effects"] if not effect["standard"]]
+    assert cause["effect"] == ("payload" if told else "link_inertia")
 
 
 def test_errors_in_motion_are_said_where_rests_make_a_difference() -> None:

@@ -77,7 +77,7 @@ def test_friction_that_turns_between_rows_is_dry_friction(seed: int, step: float
 
 def test_friction_that_builds_up_over_a_way_is_no_mean_over_rows() -> None:
     """It takes as long as a row does, or longer, at one joint."""
-    names = {"presliding.J2": -7.0, "presliding.J2.x0": 0.005}
+    names = {"presliding.J2": 7.0, "presliding.J2.x0": 0.005}
     simulated = simulate_motion(seed=6, hidden={"presliding": (["J2"], names)})
     rows = [with_rows(one, np.arange(len(one)) % 4 == 0) for one in simulated.recordings]
     checked = check_recordings(simulated.nominal, rows)
