@@ -159,6 +159,10 @@ def compensate(
     if uncertainty is not None:
         maker.set_uncertainty(uncertainty.names, uncertainty.values, uncertainty.covariance)
     if program or isinstance(targets, TargetData) and targets.is_program:
+        if kind != "pose":
+            raise InputError(
+                f"kind: found {kind!r}, expected 'pose': a program of joint positions wants those"
+            )
         return maker.joints_batch(_program(targets), given, threads=threads, progress=progress)
     return maker.pose_batch(
         _tasks(targets),

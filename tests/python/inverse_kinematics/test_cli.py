@@ -478,6 +478,10 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
             ["compensate", ROBOT, ROBOT, "program.csv", "--seed", "0,0,0,0,0,0deg"],
             "--seed: a program of joint positions",
         ),
+        (
+            ["compensate", ROBOT, ROBOT, "program.csv", "--task", "torch"],
+            "--task: a program of joint positions wants the whole poses",
+        ),
         (["compensate", ROBOT, ROBOT, "empty.csv"], "empty.csv: is empty"),
     ],
 )

@@ -31,6 +31,7 @@ from inverse_arms import (
     with_effects,
     wrapped,
 )
+from truing import InputError
 from truing.examples import example
 from truing.inverse_kinematics import (
     Compensator,
@@ -632,6 +633,8 @@ def test_the_real_robot_goes_where_it_is_wanted(in_base: bool) -> None:
 def test_a_program_of_joints_keeps_its_configuration() -> None:
     nominal, real = irb(), calibrated(irb(), 9)
     program = random_joints(nominal, 80, seed=24, share=0.9)
+    with pytest.raises(InputError, match="kind: found 'torch', expected 'pose'"):
+        truing.compensate(nominal, real, program, program=True, kind="torch")
     made = truing.compensate(nominal, real, program, program=True)
     joints = made.solutions.joints
     for k in np.flatnonzero(made.solutions.reached):

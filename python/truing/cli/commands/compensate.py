@@ -118,6 +118,13 @@ class Command(run.Command[Loaded, "Compensations"]):
         start = None if data.is_program else seed_joints(self.seed, believed, data)
         if data.is_program and self.seed:
             raise InputError("--seed: a program of joint positions says itself where the robot comes from")
+        for name in ("task", "free_axis", "retreat") if data.is_program else ():
+            if getattr(self, name) not in (None, "pose", "none"):
+                option = f"--{name.replace('_', '-')}"
+                raise InputError(
+                    f"{option}: a program of joint positions wants the whole poses that they bring the"
+                    " tool to: leave it out, or give poses"
+                )
         return Loaded(data, self._compensator(believed, real, data, index), start)
 
     def _robots(self) -> tuple[Robot, Robot]:
