@@ -157,7 +157,7 @@ def judge(result: Result, chain: Chain, cases: Cases, answers: Floats) -> None:
             np.mean(
                 [
                     any(apart(q, truth) < SAME for q in found)
-                    for found, truth in zip(good, cases.truth, strict=True)
+                    for found, truth in zip(good, cases.truth[: result.targets], strict=True)
                 ]
             )
         )
