@@ -1123,7 +1123,7 @@ def _with_poses(
             break
         points, pixels = _chosen(points, right), _chosen(pixels, right)
         if not given:
-            camera, calibration_rms, _ = _calibrate(cv, points, pixels, size)
+            camera, calibration_rms = _calibrated(cv, points, pixels, size)
         frames, errors = _poses(cv, points, pixels, camera)
     usual = float(np.median(errors))
     if given and usual > _WORTH_A_LOOK:
