@@ -258,7 +258,7 @@ def test_the_truth_is_within_what_is_said_where_frames_are_off_as_the_setup_says
         )
     said, by_filter = np.mean(squares, axis=0)
     assert 0.5 < said < 2.0
-    assert by_filter > 5.0
+    assert by_filter > 100.0
 
 
 def test_nothing_is_used_before_it_arrived() -> None:
