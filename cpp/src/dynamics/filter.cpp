@@ -61,7 +61,7 @@ Eigen::VectorXd low_pass(double cutoff, double step) {
 double bend_of(const double* x, Eigen::Index way, Eigen::Index rows) {
   constexpr int kTerms = 4;       // a cubic
   constexpr double kPlain = 3.0;  // standard errors: a bend of so many is taken for half of what it seems
-  if (rows < 2 * kTerms) return 0.0;
+  if (rows < kFewestForBend) return 0.0;
   const auto last = static_cast<double>(rows - 1);
   Eigen::MatrixXd powers(rows, kTerms);
   Eigen::VectorXd y(rows);

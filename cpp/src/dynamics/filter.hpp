@@ -18,8 +18,10 @@ struct Bends {
   double first = 0.0, last = 0.0;
 };
 
-/// The bend at x[0] of a cubic through x[0], x[way], x[2 way] …, so many rows; the
-/// less certain it is, the smaller it is taken.
+constexpr Eigen::Index kFewestForBend = 8;  ///< rows: fewer tell no bend
+
+/// The bend at x[0] of a cubic through x[0], x[way], x[2 way] …, so many rows; the less certain it is, the smaller it
+/// is taken, and of fewer than kFewestForBend it is none.
 double bend_of(const double* x, Eigen::Index way, Eigen::Index rows);
 
 /// Every `stride`-th row of x, filtered, from row 0 on; beyond its ends x is mirrored at its end points.

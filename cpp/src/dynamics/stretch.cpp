@@ -25,7 +25,6 @@ constexpr Index kTileRows = 8192;         ///< of a motion, less what leads in
 constexpr double kForgets = 0.06;         ///< [rad | m] travel after which no play operator knows what was before
 constexpr double kMostLeadIn = 60.0;      ///< [s] of a joint that rests for longer, it is forgotten
 constexpr double kRestWindow = 0.25;      ///< [s] on both sides
-constexpr Index kFewestSeen = 8;          ///< rows that tell how a joint speeds up at an end
 constexpr double kEdge = 1.0;             ///< periods of the cut-off: a turn so near to an end is seen from one side
 
 /// Torques measured, or currents times the drives' constants: NaN throughout where there is neither.
@@ -148,7 +147,7 @@ void Stretch::resample(bool ended) {
 // A joint that speeds up at an end does so beyond it: mirrored alone it would run on evenly.
 Bends Stretch::bends_of(const RowWindow& positions, Index column, bool ended) const {
   const Index rows = positions.all().rows(), period = weights_.size() / 4 + 1;
-  const Index seen = std::min(rows, std::max<Index>(kFewestSeen, period));
+  const Index seen = std::min(rows, std::max(kFewestForBend, period));
   const double* x = positions.all().col(column).data();
   Bends out;
   if (positions.begin() == 0) out.first = bend_of(x, 1, seen);
@@ -202,11 +201,13 @@ void Stretch::add_motion_between(bool ended) {
   const auto further = static_cast<Index>(columns_.size());
   MatrixXd more(end, 3 * joints_ + further);
   const MatrixXd& q = smooth_.all();
+  std::vector<Bends> bends;
+  for (Index j = 0; j < joints_; ++j) bends.push_back(bends_of(smooth_, j, ended));
   for (Index part = 0; part < between_; ++part) {
     const SplineBetween spline(static_cast<double>(part) / static_cast<double>(between_), step_);
     const Index count = (end - part + between_ - 1) / between_;
     for (Index j = 0; j < joints_; ++j) {
-      const MatrixXd values = spline.at(q.col(j), first - smooth_.begin(), count, bends_of(smooth_, j, ended));
+      const MatrixXd values = spline.at(q.col(j), first - smooth_.begin(), count, bends[static_cast<std::size_t>(j)]);
       for (Index d = 0; d < 3; ++d)
         for (Index i = 0; i < count; ++i) more(i * between_ + part, d * joints_ + j) = values(i, d);
     }

@@ -234,6 +234,8 @@ LoopEstimate refine_loop(const LoopProblem& problem, const Rows& rows, const Eig
   return out;
 }
 
+// Patterson and Thompson, Biometrika 58 (1971) 545: chi^2, the determinants of the rows' covariances, and that of the
+// information on the frames.
 double restricted_likelihood(const LoopProblem& problem, const Rows& rows, const LoopEstimate& fit) {
   const LoopSums sums = sum_loop(problem, rows, fit.X, fit.Y, fit.noise, false);
   double twice = sums.chi2 + log_determinant(sums.N);

@@ -171,6 +171,7 @@ std::set<std::string> effect_values(const Model& model, int owner) {
 
 /// Every value that the robot's effects carry is one that a law looks at: a misspelt one would do nothing.
 void require_known_values(const Model& model) {
+  if (model.robot.effects.empty()) return;
   const std::set<std::string> known = effect_values(model, -1);
   for (std::size_t k = 0; k < model.robot.effects.size(); ++k) {
     const AppliedEffect& applied = model.robot.effects[k];
