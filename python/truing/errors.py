@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -12,6 +14,16 @@ if TYPE_CHECKING:
 
 class InputError(ValueError):
     """A file, value or option cannot be used. The message says where, what was found, what was expected."""
+
+
+def did_you_mean(word: str, known: Iterable[str], least: float = 0.6) -> str:
+    """ "did you mean 'x'? " of the name that is nearest to `word`, capitals aside; "" where none is near.
+
+    least: how alike they are, 1 for equal words.
+    """
+    names = {name.casefold(): name for name in known}
+    close = difflib.get_close_matches(word.casefold(), names, n=1, cutoff=least)
+    return f"did you mean {names[close[0]]!r}? " if close else ""
 
 
 class InputWarning(UserWarning):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,8 +81,36 @@ def read_bytes(path: Path, largest: int) -> bytes:
     return data
 
 
+# How files begin that are none of ours, and what to do about it.
+_OTHER_KINDS = (
+    (b"\x1f\x8b", "is compressed by gzip: unpack it first (gunzip)"),
+    (b"BZh", "is compressed by bzip2: unpack it first (bunzip2)"),
+    (b"\xfd7zXZ", "is compressed by xz: unpack it first (unxz)"),
+    (b"\x28\xb5\x2f\xfd", "is compressed by zstd: unpack it first (unzstd)"),
+    (b"PK\x03\x04", "is a zip archive or a workbook (.xlsx, .ods): unpack it, or save its sheet as CSV"),
+    (b"\xd0\xcf\x11\xe0", "is a workbook (.xls): save its sheet as CSV (UTF-8)"),
+    (b"\x93NUMPY", "is an array of numpy: save it as CSV or Parquet, with the names of its columns"),
+    (b"\x89HDF", "is an HDF5 file: save its table as CSV or Parquet"),
+    (b"MATLAB 5.0 MAT-file", "is a MAT-file: save its table as CSV or Parquet (writetable)"),
+    (b"%PDF-", "is a PDF, expected text"),
+    (b"\x89PNG", "is a picture, expected text"),
+    (b"version https://git-lfs", "stands for a file that was not fetched: `git lfs pull` fetches it"),
+)
+_WEB_PAGE = re.compile(rb"\s*<(!doctype html|html)", re.IGNORECASE)
+
+
+def refuse_other_kinds(path: Path, head: bytes) -> None:
+    """Raises InputError for a file that begins as one of another kind does."""
+    for beginning, kind in _OTHER_KINDS:
+        if head.startswith(beginning):
+            raise InputError(f"{path}: {kind}")
+    if _WEB_PAGE.match(head):
+        raise InputError(f"{path}: is a web page, not the file that it speaks of: download that")
+
+
 def decoded(path: Path, data: bytes) -> str:
     """`data` as text; an InputError that says why when it is not UTF-8 text."""
+    refuse_other_kinds(path, data)
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError(f"{path}: is UTF-16 text, expected UTF-8: save it again as UTF-8")
     position = data.find(b"\0")

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 import re
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from pydantic import PlainValidator
 
 from truing import _core
-from truing.errors import InputError, InputWarning
+from truing.errors import InputError, InputWarning, did_you_mean
 from truing.files.boards import Board, BoardViews, find_board, parse_board, plausible_camera
 from truing.files.common import PathLike, atomic_write, listed
 from truing.files.opencv_file import is_opencv_file, read_opencv_camera
@@ -172,8 +171,7 @@ class _Plan:
         }
         if stem not in kinds:
             names = [f"{side}_{axis}_m" for axis in _POSITION] + [f"{side}_{part}" for part in _QUATERNION]
-            close = difflib.get_close_matches(name, names, n=1)
-            hint = f"did you mean {close[0]!r}? " if close else ""
+            hint = did_you_mean(name, names)
             self.table.refuse(
                 f"unknown column; {hint}of the {side} ({_SIDES[side]}) there are {listed(names)}, or angles:"
                 f" {side}_rx_deg …",
@@ -225,13 +223,8 @@ class _Plan:
         missing = [stem for stem in stems if f"{side}_{stem}" not in self.columns]
         if missing:
             wanted = f"{side}_{missing[0]}{ending}"
-            close = difflib.get_close_matches(
-                wanted,
-                [name for name in self.table.names if name not in self.columns.values()],
-                n=1,
-                cutoff=0.75,
-            )
-            hint = f"did you mean {close[0]!r}? " if close else ""
+            others = [name for name in self.table.names if name not in self.columns.values()]
+            hint = did_you_mean(wanted, others, 0.75)
             self.table.refuse(
                 f"there is no column {wanted} ({_SIDES[side]}: {why}); {hint}the columns are"
                 f" {listed(self.table.names)}"

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import warnings
@@ -16,7 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from truing import _core
-from truing.errors import InputError, InputWarning
+from truing.errors import InputError, InputWarning, did_you_mean
 from truing.files.common import PathLike, Units, listed, write_table
 from truing.files.plausibility import check_units_look_right
 from truing.files.program_poses import is_program, read_program_poses
@@ -179,9 +178,8 @@ class _Plan:
             if f"q{number}" in self.known:
                 continue
             wanted = [f"q{number}_{unit}" for unit in (_ANGLES if joint.type == "revolute" else _LENGTHS)]
-            close = [name for name in self.table.names if name.lower() in wanted]
-            close = close or difflib.get_close_matches(wanted[0], self.table.names, n=1, cutoff=0.8)
-            hint = f"did you mean {close[0]!r}? " if close and close[0] not in self.numbers else ""
+            others = [name for name in self.table.names if name not in self.numbers]
+            hint = did_you_mean(wanted[0], others, 0.8) or did_you_mean(wanted[1], others, 0.8)
             self.table.refuse(
                 f"there is no column {' or '.join(wanted)} for joint {joint.name!r}; {hint}"
                 f"the columns are {listed(self.table.names)}"

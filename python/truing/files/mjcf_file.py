@@ -507,6 +507,12 @@ class _Chain:
             "torque_limit": self._torque_limit(joint),
             **self.links[k].fields(),
         }
+        lower, upper = self.m.jnt_range[joint]
+        if lower > upper:  # MuJoCo takes such a joint for one without limits
+            self._refuse(
+                f"joint {shown(self._joint_name(joint))}: its range is {lower:g} to {upper:g}, expected the"
+                " lower limit first"
+            )
         if limited:
             fields["lower"], fields["upper"] = (float(value) for value in self.m.jnt_range[joint])
         if joint in self.followers:

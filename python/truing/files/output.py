@@ -97,11 +97,13 @@ def atomic_write(path: PathLike) -> Iterator[Path]:
     when `path` cannot be written, OSError when the disk is full.
     """
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected the name of a file to write")
     try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder, expected the name of a file to write")
         temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
         temporary.touch(exist_ok=False)
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise _not_written(path, error) from None
     try:
@@ -128,8 +130,11 @@ def atomic_output_dir(
     the disk is full.
     """
     path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: is a file, expected a folder to write to")
+    try:
+        if path.exists() and not path.is_dir():
+            raise InputError(f"{path}: is a file, expected a folder to write to")
+    except OSError as error:
+        raise _not_written(path, error) from None
     made: list[tuple[Path, int]] = []
     try:
         with _interrupts_held_back():
@@ -144,7 +149,7 @@ def atomic_output_dir(
         with _interrupts_held_back():
             try:
                 _move_content(
-                    temporary, path, [name for name in obsolete if not _is_any(path / name, inputs)]
+                    temporary, path, [name for name in obsolete if not is_one_of(path / name, inputs)]
                 )
             except OSError as error:
                 raise _not_written(path, error) from None
@@ -196,7 +201,7 @@ def _clear(home: Path) -> None:
                 os.close(lock)
 
 
-def _is_any(file: Path, others: Sequence[Path]) -> bool:
+def is_one_of(file: Path, others: Sequence[Path]) -> bool:
     """Whether a file is one of these, by whatever name."""
     for other in others:
         with contextlib.suppress(OSError, ValueError):
@@ -208,7 +213,7 @@ def _is_any(file: Path, others: Sequence[Path]) -> bool:
 def _require_no_input(source: Path, destination: Path, inputs: Sequence[Path]) -> None:
     for file in source.rglob("*"):
         target = destination / file.relative_to(source)
-        if _is_any(target, inputs):
+        if is_one_of(target, inputs):
             raise InputError(
                 f"{target}: is an input of this run, and would be replaced by its result: write to another"
                 " folder (--out)"
@@ -217,7 +222,7 @@ def _require_no_input(source: Path, destination: Path, inputs: Sequence[Path]) -
 
 def _require_same_command(source: Path, destination: Path, inputs: Sequence[Path]) -> None:
     """A result that was read from belongs together: no other command's result.json replaces its own."""
-    if not _is_any(destination, [file.parent for file in inputs if file.is_file()]):
+    if not is_one_of(destination, [file.parent for file in inputs if file.is_file()]):
         return
     there, new = _format_of(destination / RESULT), _format_of(source / RESULT)
     if there and new and there != new:

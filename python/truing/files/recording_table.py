@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import re
 import warnings
@@ -17,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from truing import _core
-from truing.errors import InputWarning
+from truing.errors import InputWarning, did_you_mean
 from truing.files.common import listed, shown
 from truing.files.recording_parts import checked_times, joints_of_numbers, make_recordings, table_of
 from truing.files.table import Floats, Table
@@ -195,9 +194,11 @@ class _Layout:
                 continue
             units = _ANGLE if joint.type == "revolute" else _LENGTH
             wanted = [f"q{number_of[index]}_{unit}" for unit in units]
-            close = [name for name in self.others if name.lower() in wanted]
-            close = close or difflib.get_close_matches(wanted[0], self.others, n=1, cutoff=0.8)
-            hint = f"did you mean {close[0]!r}? " if close else self._shorter_arm(index)
+            hint = (
+                did_you_mean(wanted[0], self.others, 0.8)
+                or did_you_mean(wanted[1], self.others, 0.8)
+                or self._shorter_arm(index)
+            )
             self.table.refuse(
                 f"there is no column {' or '.join(wanted)}, the position of joint {joint.name!r}; {hint}"
                 f"the columns are {listed(self.table.names)}"

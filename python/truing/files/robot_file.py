@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Context, Decimal
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from truing import _core
-from truing.errors import InputError, InputWarning
+from truing.errors import InputError, InputWarning, did_you_mean
 from truing.files.abb_file import robot_from_moc
 from truing.files.arms import ARMS
 from truing.files.common import PathLike, Units, atomic_write, decoded, listed, read_bytes, shown
@@ -33,6 +34,7 @@ from truing.files.lerobot_calibration import robot_from_lerobot
 from truing.files.mjcf_file import is_mjcf, robot_from_mjcf
 from truing.files.ur_file import robot_from_calibration_conf, robot_from_urp
 from truing.files.yaml_tree import (
+    LARGEST_YAML,
     LONGEST_NAME,
     NAME,
     AngleName,
@@ -158,7 +160,13 @@ class _UrdfChain(_RobotFile):
 
 
 def load_robot(
-    path: PathLike, base_link: str = "", tip_link: str = "", *, any_tool: bool = False, arm: str = ""
+    path: PathLike,
+    base_link: str = "",
+    tip_link: str = "",
+    *,
+    any_tool: bool = False,
+    arm: str = "",
+    known: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> _core.Robot:
     """Read a robot from robot.yaml, URDF (.urdf, .xml), MJCF (.xml; needs MuJoCo: truing[dynamics]), or from
     a controller's file: calibration.conf or .urp of Universal Robots, MOC.cfg of ABB, LeRobot's calibration
@@ -168,6 +176,8 @@ def load_robot(
     empty: its only root and its only leaf. any_tool: of a URDF whose joints form one chain the tip need not
     be named, however many links are fixed to the last one; the tool is then that link (torques know none).
     arm: of a controller's file, see `load_controller`; also behind an @ of `path`, "calibration.conf@ur10e".
+    known: names that effects of a robot.yaml may have, by its key (`effects`, `torque_effects`), where those
+    of one's own are not taken.
     Warns (InputWarning) of what an MJCF has and a robot does not: contacts, moving branches; and of what a
     controller's file says that changes how its robot is to be calibrated.
     Raises InputError that names the file, the line, what was found and what was expected.
@@ -197,7 +207,7 @@ def load_robot(
     document, model_of_file = _read(path)
     _check_names(document, model_of_file)
     _check_joints(document, model_of_file)
-    _check_effects(document, model_of_file)
+    _check_effects(document, model_of_file, known)
     _check_units_look_right(document, model_of_file)
     try:
         robot = _to_robot(model_of_file, path.stem)
@@ -354,7 +364,12 @@ def _check_lengths_of_names(path: Path, robot: _core.Robot) -> None:
 
 
 def _read(path: Path) -> tuple[Document, _LinkTable | _UrdfChain]:
-    document = Document.read(path, _KIND)
+    text = decoded(path, read_bytes(path, LARGEST_YAML))
+    if text.lstrip().startswith("<"):
+        raise InputError(
+            f"{path}: is XML, expected a {_KIND}: the name of a URDF ends in .urdf, of an MJCF in .xml"
+        )
+    document = Document(path, text, _KIND)
     if "format" not in document.value:
         document.refuse((), f"key 'format' is missing: a robot file starts with `format: {FORMAT}`")
     if document.value["format"] != FORMAT:
@@ -462,10 +477,18 @@ def _circle(start: str, drivers: Mapping[str, Sequence[str]]) -> list[str]:
     return []
 
 
-def _check_effects(document: Document, model: _LinkTable | _UrdfChain) -> None:
+def _check_effects(
+    document: Document, model: _LinkTable | _UrdfChain, known: Mapping[str, Sequence[str]]
+) -> None:
     names = [joint.name for joint in model.joints]
     for key, effects in (("effects", model.effects), ("torque_effects", model.torque_effects)):
         for i, effect in enumerate(effects):
+            if key in known and effect.effect.partition("@")[0] not in known[key]:
+                hint = did_you_mean(effect.effect, known[key])
+                document.refuse(
+                    (key, i, "effect"),
+                    f"there is no effect {shown(effect.effect)}; {hint}there are {listed(known[key], 60)}",
+                )
             for k, joint in enumerate(effect.joints):
                 if joint not in names:
                     document.refuse(

@@ -6,7 +6,6 @@ and setup.yaml (format truing-track/1).
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import warnings
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from pydantic import PlainValidator
 
 from truing import _core
-from truing.errors import InputWarning
+from truing.errors import InputWarning, did_you_mean
 from truing.files.common import PathLike, atomic_write, listed, write_table
 from truing.files.table import Floats, Table
 from truing.files.yaml_tree import (
@@ -192,10 +191,8 @@ class _Stream:
                 column=other,
             )
         if not optional:
-            close = difflib.get_close_matches(
-                names[0], [name for name in self.table.names if name not in self.taken], n=1, cutoff=0.7
-            )
-            hint = f"did you mean {close[0]!r}? " if close else ""
+            others = [name for name in self.table.names if name not in self.taken]
+            hint = did_you_mean(names[0], others, 0.7)
             self.table.refuse(
                 f"there is no column {names[0]} ({self.kind}); {hint}the columns are"
                 f" {listed(self.table.names)}"
@@ -761,8 +758,7 @@ def _numbers(document: Document, key: str, values: Mapping[str, Any], options: o
     ]
     for name, value in values.items():
         if name not in names:
-            close = difflib.get_close_matches(name, names, n=1)
-            hint = f"did you mean {close[0]!r}? " if close else ""
+            hint = did_you_mean(name, names)
             document.refuse((key, name), f"unknown key; {hint}expected one of {listed(names)}")
         if not isinstance(value, Decimal) or not value.is_finite() or value < 0:
             document.refuse((key, name), f"found {found(value)}, expected a number that is not below 0")

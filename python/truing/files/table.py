@@ -44,6 +44,9 @@ _READ_AHEAD = 1 << 18  # [bytes] of a column of a Parquet file read in parts; el
 # What programs write for "no value"; "nan" is not among them: a number that came out as NaN is another
 # matter.
 _EMPTY = ["", "NA", "N/A", "#N/A", "null", "NULL"]
+# A line that begins so is a comment; what Excel writes of a sum that went wrong (#DIV/0!) is a cell.
+_COMMENT = re.compile(r"#(?!(DIV/0!|N/A|NAME\?|NULL!|NUM!|REF!|VALUE!))")
+_COMMENT_LINE = re.compile(b"(?m)^" + _COMMENT.pattern.encode() + b".*\n?")
 _NUMBER = re.compile(
     r"\s*[-+]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?|inf(inity)?|nan)\s*", re.IGNORECASE
 )
@@ -350,21 +353,16 @@ class Table:
                     raise InputError(
                         f"{where}: has the column {name!r}, which {self._beside.file} gives as well"
                     )
-        if len(self.names) == 1:
-            for separator, called in ((";", "semicolons"), ("\t", "tabs")):
-                if separator in self.names[0]:
-                    raise InputError(
-                        f"{where}: columns are separated by {called}, expected commas (and points as decimal"
-                        " marks)"
-                    )
+        self._check_first_line(where)
         if len(self.names) > _MOST_COLUMNS:
             raise InputError(f"{where}: has {len(self.names)} columns, expected at most {_MOST_COLUMNS}")
         first: dict[str, int] = {}
         for number, name in enumerate(self.names, 1):
             if not name:
+                end = "; the line ends with a comma: remove it" if number == len(self.names) else ""
                 raise InputError(
                     f"{where}: column {number} has no name; the others are"
-                    f" {listed([n for n in self.names if n])}"
+                    f" {listed([n for n in self.names if n])}{end}"
                 )
             if not name.isprintable():
                 raise InputError(
@@ -376,6 +374,25 @@ class Table:
                     f"{where}: columns {first[name]} and {number} are both called {name!r}: remove one"
                 )
             first[name] = number
+
+    def _check_first_line(self, where: str | Path) -> None:
+        """Is it one of column names at all?"""
+        first = self.names[0]
+        if first.startswith("#") and not self._is_parquet:
+            raise InputError(
+                f"{where}: found {shown(first)}, expected column names: remove lines that begin with #, or"
+                " the # before the names"
+            )
+        if all(name and _is_cell_of_number(name.encode()) for name in self.names):
+            raise InputError(f"{where}: found {listed(self.names, 6)}, expected the names of the columns")
+        if len(self.names) > 1:
+            return
+        for separator, called in ((";", "semicolons"), ("\t", "tabs"), (" ", "blanks")):
+            if separator in first:
+                raise InputError(
+                    f"{where}: columns are separated by {called}, expected commas (and points as decimal"
+                    " marks)"
+                )
 
     def _parquet_names(self) -> list[str]:
         try:
@@ -460,7 +477,7 @@ class Table:
             # Not mmap.find: before CPython 3.11.5 it reads a byte beyond a file that fills its last page.
             if not re.search(rb"\n#", data) and self._header == 1 and not self._header_is_comment:
                 return str(self.path), 1
-            kept = re.sub(rb"(?m)^#.*\n?", b"", data[:].removeprefix(_MARK))
+            kept = _COMMENT_LINE.sub(b"", data[:].removeprefix(_MARK))
         return pa.BufferReader(kept), 0 if self._header_is_comment else 1
 
     def _csv_lines(self) -> Iterator[tuple[int, list[str]]]:
@@ -471,7 +488,7 @@ class Table:
             reader = csv.reader(file)
             next(reader)  # the column names, in a comment or not
             for cells in reader:
-                if cells and self._comments and cells[0].startswith("#"):
+                if cells and self._comments and _COMMENT.match(cells[0]):
                     continue
                 if cells:  # Arrow passes over blank lines, too
                     yield self._header - 1 + reader.line_num, cells
@@ -487,18 +504,23 @@ class Table:
                 last = line
                 if len(cells) != len(self._own):
                     raise InputError(
-                        f"{self.path}, line {line}: found {len(cells)} cells, expected {len(self._own)} "
-                        "as there are column names"
+                        f"{self.path}, line {line}: found {len(cells)} cell{'' if len(cells) == 1 else 's'},"
+                        f" expected {len(self._own)} as there are column names"
+                        f"{'; a comment? remove it' if cells[0].startswith('#') else ''}"
                     )
                 for place, name in places:
                     if cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
-                        hint = " with a point as decimal mark" if "," in cells[place] else ""
-                        raise InputError(
-                            f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, "
-                            f"expected a number{hint}"
-                        )
+                        self._refuse_word(line, name, cells[place])
         except csv.Error as error:
             raise InputError(f"{self.path}, after line {last}: cannot be read as a table: {error}") from None
+
+    def _refuse_word(self, line: int, name: str, cell: str) -> NoReturn:
+        hint = " with a point as decimal mark" if "," in cell else ""
+        if "\n" in cell:
+            hint = ": a quotation mark that is not closed?"
+        raise InputError(
+            f"{self.path}, line {line}, column {name!r}: found {shown(cell)}, expected a number{hint}"
+        )
 
     def _csv_cell(self, row: int, column: str | None) -> tuple[int, str]:
         """Line number of a row, and the text in one of its cells."""
@@ -513,14 +535,16 @@ class Table:
 
     def _refuse_text(self, name: str, kind: str, *, known: bool) -> NoReturn:
         if self._is_parquet:
-            self.refuse(f"holds {kind} values, expected numbers", column=name)
+            unknown = "" if known else ", or no such column: remove it"
+            self.refuse(f"holds {kind} values, expected numbers{unknown}", column=name)
         place = self._own.index(name)
         for line, cells in self._csv_lines():
             if place < len(cells) and cells[place] not in _EMPTY and not _NUMBER.fullmatch(cells[place]):
                 what = (
                     "a number"
                     if known
-                    else "a number: an unknown column is kept as a covariate, and text cannot be one"
+                    else "a number: an unknown column is kept as a covariate, and text cannot be one: remove"
+                    " the column"
                 )
                 raise InputError(
                     f"{self.path}, line {line}, column {name!r}: found {shown(cells[place])}, expected {what}"

@@ -6,7 +6,6 @@ name.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from truing import _core
-from truing.errors import InputError
+from truing.errors import InputError, did_you_mean
 from truing.files.common import PathLike, listed, shown
 from truing.files.plausibility import check_joint_units_look_right, check_targets_look_right
 from truing.files.program_poses import is_program as is_robot_program, wanted_poses
@@ -183,8 +182,7 @@ class _Plan:
             + [_TASK]
             + [self._wanted(role).split(" or ")[0] for role in self.joint_roles("q")]
         )
-        close = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
-        hint = f"did you mean {close[0]!r}? " if close else ""
+        hint = did_you_mean(name, known, 0.75)
         self.table.refuse(
             f"unknown column; {hint}expected {listed(known)}, dir1 …; remove what is no part of a target",
             column=name,

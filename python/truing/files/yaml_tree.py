@@ -9,7 +9,6 @@ is written in degrees or millimetres comes back bit for bit.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -21,14 +20,14 @@ import yaml
 from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError
 from pydantic_core import PydanticCustomError
 
-from truing.errors import InputError
+from truing.errors import InputError, did_you_mean
 from truing.files.common import decoded, listed, read_bytes, shown
 from truing.limits import LARGEST_NUMBER
 
 Loc = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
-_LARGEST_FILE = 1_000_000  # [bytes] a robot of 200 joints and 2000 targets has 0.3 million
+LARGEST_YAML = 1_000_000  # [bytes] a robot of 200 joints and 2000 targets has 0.3 million
 _MOST_DIGITS = 100
 LONGEST_NAME = 200  # characters
 NAME = f"a name of at most {LONGEST_NAME} characters"
@@ -64,6 +63,8 @@ class Document:
             self._refuse_yaml(error)
         except RecursionError:
             raise InputError(f"{path}: is nested too deeply for a {kind}") from None
+        except InputError:
+            raise
         except (ValueError, OverflowError) as error:
             # PyYAML lets these through, e.g. from "\UFFFFFFFF".
             raise InputError(f"{path}: is not YAML: {error}") from None
@@ -76,7 +77,7 @@ class Document:
 
     @classmethod
     def read(cls, path: Path, kind: str, *, lists: bool = False) -> Document:
-        return cls(path, decoded(path, read_bytes(path, _LARGEST_FILE)), kind, lists=lists)
+        return cls(path, decoded(path, read_bytes(path, LARGEST_YAML)), kind, lists=lists)
 
     def line(self, loc: Loc) -> int | None:
         """The line of `loc`, or of the nearest thing around it."""
@@ -216,7 +217,8 @@ def expected(value: object, what: str) -> PydanticCustomError:
 
 def _number(value: object) -> Decimal:
     if not isinstance(value, Decimal) or not value.is_finite():
-        raise expected(value, "a finite number")
+        quoted = isinstance(value, str) and _NUMBER.fullmatch(value)
+        raise expected(value, "a finite number, without quotation marks" if quoted else "a finite number")
     if abs(value) > LARGEST_NUMBER:
         raise expected(value, f"a number between -{LARGEST_NUMBER:.0e} and {LARGEST_NUMBER:.0e}")
     if len(value.as_tuple().digits) > _MOST_DIGITS:
@@ -296,8 +298,9 @@ def _explained(complaint: Any, model: type[BaseModel]) -> tuple[Loc, str]:
     kind = complaint["type"]
     if kind == "extra_forbidden":
         keys = _keys_at(model, loc[:-1])
-        close = difflib.get_close_matches(str(loc[-1]), keys, n=1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
+        hint = did_you_mean(str(loc[-1]), keys)
+        if str(loc[-1]).isdigit():
+            hint = "a comma as decimal mark in what is before it? "
         return loc, f"unknown key; {hint}expected one of {listed(keys)}"
     if kind == "missing":
         return loc[:-1], f"key {loc[-1]!r} is missing"

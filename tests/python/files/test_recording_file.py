@@ -236,6 +236,14 @@ def test_column_names_may_be_a_comment_as_numpy_writes_them(tmp_path: Path) -> N
     assert "line 7, column 'q1_rad': found 'nan'" in refusal(path)
 
 
+def test_a_row_that_begins_with_a_sum_gone_wrong_is_no_comment(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    lines = [f"{t},{a},{b}" for t, a, b in zip(T, Q1, Q2, strict=True)]
+    lines[4] = "#DIV/0!,0,0"
+    path.write_text("\n".join(["# made by a workbook", "t_s,q1_rad,q2_m", *lines, ""]))
+    assert "line 7, column 't_s': found '#DIV/0!', expected" in refusal(path)
+
+
 @pytest.mark.parametrize(
     ("columns", "message"),
     [

@@ -88,7 +88,7 @@ joints:
 torque_limit: 600.1}
 torque_effects:
   - {effect: coulomb, joints: [J1], parameters: {coulomb.J1: 7.25}}
-  - {effect: payload, joints: [], parameters: {payload.m: 2.5, payload.mz: 0.1}}
+  - {effect: payload, joints: [], parameters: {payload.m: 2.5, payload.mx: 0, payload.my: 0, payload.mz: 0.1}}
 """
 
 URDF = """\
@@ -194,7 +194,7 @@ def test_what_drives_and_what_is_driven_arrives(tmp_path: Path) -> None:
     assert rail.inertia is None and rail.torque_per_ampere is None
     assert [(e.effect, list(e.joints), dict(e.parameters)) for e in robot.torque_effects] == [
         ("coulomb", ["J1"], {"coulomb.J1": 7.25}),
-        ("payload", [], {"payload.m": 2.5, "payload.mz": 0.1}),
+        ("payload", [], {"payload.m": 2.5, "payload.mx": 0.0, "payload.my": 0.0, "payload.mz": 0.1}),
     ]
     still = load(tmp_path, PALLETIZER).joints[0]
     assert (still.rotor_inertia, still.speed_limit, still.torque_limit) == (0, math.inf, math.inf)
@@ -502,6 +502,17 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "joints no list": ("joints:\n", "joints: 5\nx:\n", "unknown key|expected a list"),
     "tag": ("a: 1.15", "a: !!python/object:os.system 1", "line 10: found the YAML tag"),
     "half a character": ("name: J3", 'name: "\\ud800"', "line 11: found half a character"),
+    "key twice": ("name: J3", "name: J3, name: J4", "^[^ ]+, line 11: key 'name' is there twice"),
+    "number in quotes": (
+        "mass: 220",
+        'mass: "220"',
+        "found '220', expected a finite number, without quotation",
+    ),
+    "comma within a mapping": (
+        "mass: 220",
+        "mass: 220,5",
+        "5: unknown key; a comma as decimal mark in what is before it",
+    ),
     "not YAML": ("[-2.6, 2.6]", "[-2.6, 2.6", "line .*is not YAML"),
     "tab": ("  - {name: J3", "\t- {name: J3", "line 11.*is not YAML"),
     # Suspicions: right in form, but the unit cannot be meant.
@@ -581,6 +592,7 @@ def test_what_is_wrong_with_drives_is_named_with_its_line(
         (b"\x7fELF\x02\x01\x00\x00\x00", "binary file"),
         (b"\xff\xfef\x00o\x00r\x00", "UTF-16"),
         (b"name: caf\xe9\n", "line 1: byte 0xe9 is not UTF-8"),
+        (b"<robot name='arm'/>", "is XML, expected a robot file: the name of a URDF ends in .urdf"),
         (b"just text", "line 1: found 'just text', expected a robot file"),
         (b"- 1\n- 2\n", "line 1: found a list of 2, expected a robot file"),
         (b"a: 1\n---\nb: 2\n", "is not YAML"),
