@@ -28,7 +28,7 @@ from typer.core import TyperCommand, TyperGroup
 from truing.cli.interrupts import was_interrupted
 from truing.cli.options import Choice, Default, File, Flag, Kind
 from truing.cli.tables import harmless
-from truing.errors import InputError
+from truing.errors import InputError, did_you_mean
 
 COMMANDS = Path(__file__).parent / "commands"
 
@@ -108,6 +108,13 @@ class LazyGroup(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         return list(places(self.folder))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        known = places(self.folder)
+        if args and args[0] not in known and not args[0].startswith("-"):
+            hint = did_you_mean(args[0], known) or f"there are {', '.join(known)} "
+            ctx.fail(f"No such command {args[0]!r}; {hint.rstrip()}")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         place = places(self.folder).get(cmd_name)

@@ -8,7 +8,7 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from truing.cli import run
 from truing.cli.options import (
@@ -61,6 +61,8 @@ class FleetWork(run.Command["Robot", Found]):
     """A command whose work is done by workers."""
 
     own_processes = True
+    torques: ClassVar[bool] = False
+    """Whether the robot's effects on torques count, not those on its poses."""
 
     robot: RobotFile
     scheduler: Annotated[
@@ -88,13 +90,13 @@ class FleetWork(run.Command["Robot", Found]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Robot:
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
 
         if self.scheduler and self.workers is not None:
             raise InputError(
                 "--scheduler and --workers: found both, expected one: a scheduler has workers of its own"
             )
-        return load_robot(self.robot, self.base_link, self.tip_link)
+        return load_robot(self.robot, self.base_link, self.tip_link, torques=self.torques)
 
     @contextlib.contextmanager
     def client(self) -> Iterator[Any]:

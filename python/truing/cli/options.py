@@ -128,6 +128,8 @@ class File(Kind):
     metavar = "FILE"
 
     def read(self, text: str, option: str) -> Path:
+        if not text:  # of a variable of the shell that is not set, as a rule; it would be this folder
+            raise refused(option, text, "a path")
         return Path(text)
 
 

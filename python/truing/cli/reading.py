@@ -11,6 +11,23 @@ if TYPE_CHECKING:
     from truing.model import Measurements, Robot
 
 
+def load_robot(
+    path: Path | str,
+    base_link: str = "",
+    tip_link: str = "",
+    *,
+    any_tool: bool = False,
+    torques: bool = False,
+) -> Robot:
+    """A robot whose effects, those on torques if `torques`, are of the catalogue: a command has no others."""
+    from truing import files
+    from truing.dynamics.api import effect_names
+    from truing.model import catalogue
+
+    known = {"torque_effects": effect_names()} if torques else {"effects": [name for name, _ in catalogue()]}
+    return files.load_robot(path, base_link, tip_link, any_tool=any_tool, known=known)
+
+
 def robot_and_measurements(
     robot: Path,
     data: Path,
@@ -21,7 +38,7 @@ def robot_and_measurements(
     program: Path | None = None,
 ) -> tuple[Robot, Measurements]:
     """program: gives the joints of the rows."""
-    from truing.files import load_measurements, load_robot
+    from truing.files import load_measurements
 
     model = load_robot(robot, base_link, tip_link)
     if program is None:

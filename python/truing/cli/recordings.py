@@ -117,9 +117,9 @@ class ReadMotion:
 
     def read_robot(self, file: Path) -> Robot:
         """With masses, and the drive constants that were given."""
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
 
-        robot = load_robot(file, self.base_link, self.tip_link, any_tool=True)
+        robot = load_robot(file, self.base_link, self.tip_link, any_tool=True, torques=True)
         if self.torque_per_ampere is not None:
             robot = with_drives(robot, self.torque_per_ampere)
         require_masses(file, robot)

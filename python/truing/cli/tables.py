@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -34,7 +36,11 @@ def harmless(text: str) -> str:
 
 
 def console(**options: Any) -> Console:
+    """Lines are folded at the terminal's width, or at COLUMNS; in a pipe or a file a row stays a line."""
     from rich.console import Console
+
+    if "COLUMNS" not in os.environ and not sys.stdout.isatty():
+        options.setdefault("width", _ENDLESS)
 
     class Plain(Console):
         def on_broken_pipe(self) -> None:

@@ -199,6 +199,8 @@ def _spread_out(rows: int) -> NDArray[np.intp]:
 def _check_gyro(imu: ImuData, t: Floats, flange: Floats) -> None:
     """The gyro's rms against that of the flange's turns: the same, but for sway."""
     step = max(1, int(0.05 / max(1e-6, float(np.median(np.diff(t))))))
+    if len(t) <= step:
+        return
     a, b = flange[:-step:step, :3, :3], flange[step::step, :3, :3]
     trace = np.einsum("nij,nij->n", a, b)
     rate = np.arccos(np.clip((trace - 1) / 2, -1, 1)) / np.maximum(1e-6, (t[step:] - t[:-step])[::step])

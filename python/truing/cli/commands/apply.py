@@ -142,7 +142,7 @@ class Command(run.Command[Loaded, "Outcome"]):
         return [*self.programs, self.nominal, self.real]
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
         from truing.files.programs import Given, brand_of, parse_place
         from truing.programs import ApplyOptions
 

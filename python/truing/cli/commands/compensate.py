@@ -128,7 +128,7 @@ class Command(run.Command[Loaded, "Compensations"]):
         return Loaded(data, self._compensator(believed, real, data, index), start)
 
     def _robots(self) -> tuple[Robot, Robot]:
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
 
         believed = load_robot(self.nominal, self.base_link, self.tip_link)
         # A calibrated robot of convention urdf is written as YAML, which has no links to choose.

@@ -86,9 +86,10 @@ class Command(run.Command["Loaded", "Exported"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
+        from truing.cli.reading import load_robot
         from truing.controllers import ExportOptions, load_result
         from truing.controllers.frames import BRANDS
-        from truing.files import is_urdf, load_robot
+        from truing.files import is_urdf
 
         calibration = load_result(self.result)
         links = (

@@ -213,7 +213,8 @@ class Command(run.Command[Loaded, "Solved | None"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot, read_handeye_answer
+        from truing.cli.reading import load_robot
+        from truing.files import read_handeye_answer
         from truing.hand_eye.comparison import require_setup
         from truing.hand_eye.reading import load_on_one_clock
 

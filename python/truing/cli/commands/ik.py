@@ -92,7 +92,8 @@ class Command(run.Command[Loaded, "Solved"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot, load_targets
+        from truing.cli.reading import load_robot
+        from truing.files import load_targets
         from truing.inverse_kinematics import InverseSolver
 
         if self.path and self.all_branches:

@@ -42,7 +42,7 @@ class Command:
     def run(self) -> int:
         from truing.errors import InputError
         from truing.files import is_controller, save_robot
-        from truing.files.output import files_read
+        from truing.files.output import files_read, is_one_of
 
         if self.arm and not any(is_controller(str(file)) for file in self.files):
             raise InputError(
@@ -51,7 +51,7 @@ class Command:
         with files_read() as read:
             models = [self._load(str(file)) for file in self.files]
         apart = [_apart(models[0], model) for model in models[1:]]
-        if any(self.out.exists() and self.out.samefile(file) for file in read if file.exists()):
+        if is_one_of(self.out, read):
             raise InputError(f"{self.out}: is an input of this run: write to another file (--out)")
         save_robot(self.out, models[0].robot, calibration=models[0].calibration)
         if self.json:

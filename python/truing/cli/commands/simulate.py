@@ -176,7 +176,8 @@ class Command(run.Command["tuple[Robot, Floats | None]", "Simulation | Simulated
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> tuple[Robot, Floats | None]:
-        from truing.files import load_measurements, load_robot
+        from truing.cli.reading import load_robot
+        from truing.files import load_measurements
 
         robot = load_robot(self.robot, self.base_link, self.tip_link)
         if self.stream or self.plan is None:

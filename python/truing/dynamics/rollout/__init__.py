@@ -134,7 +134,7 @@ def held_out_rows(
     if list(held_out) != [BLOCKS_OF_TIME]:
         return [np.full(len(r), r.name in held_out) for r in recordings]
     return [
-        np.any([(r.time >= begin) & (r.time < end) for begin, end in spans], axis=0)
+        np.any([r.time < -np.inf, *((r.time >= begin) & (r.time < end) for begin, end in spans)], axis=0)
         for r, spans in zip(recordings, held_out_blocks(recordings, test_share), strict=True)
     ]
 

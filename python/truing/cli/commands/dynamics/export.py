@@ -109,9 +109,10 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
     ] = ()
 
     def load(self, progress: run.Progress) -> Loaded | LoadedServo:
+        from truing.cli.reading import load_robot
         from truing.dynamics.export.refit import training
         from truing.dynamics.servo.export import is_servo_result
-        from truing.files import load_recordings, load_residual_motion, load_robot
+        from truing.files import load_recordings, load_residual_motion
 
         if is_servo_result(self.result):
             return self._load_servo()
@@ -124,7 +125,7 @@ class Command(run.Command["Loaded | LoadedServo", Found]):
                 f"{file}: there is no such file: expected the folder that `truing dynamics diagnose` or"
                 " `identify` wrote, or a robot.yaml"
             )
-        robot = load_robot(file)
+        robot = load_robot(file, torques=True)
         residuals = self.result / "residuals.parquet"
         motion = load_residual_motion(residuals, robot) if residuals.exists() else []
         train = training(motion)

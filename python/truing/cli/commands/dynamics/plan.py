@@ -34,6 +34,7 @@ from truing.cli.options import (
 )
 from truing.cli.recordings import ReadMotion, RobotWithMasses
 from truing.cli.tables import joined, say_first, table
+from truing.errors import InputError
 
 if TYPE_CHECKING:
     from truing.dynamics import Recording, TorquePlan
@@ -146,7 +147,12 @@ class Command(ReadMotion, run.Command["tuple[Robot, list[Recording]]", "TorquePl
 
     def load(self, progress: run.Progress) -> tuple[Robot, list[Recording]]:
         robot = self.read_robot(self.robot)
-        return robot, self.read_recordings(robot, self.recordings) if self.recordings else []
+        if self.recordings:
+            return robot, self.read_recordings(robot, self.recordings)
+        for option, value in (("--joints", self.joints), ("--topic", self.topic), ("--units", self.units)):
+            if value:
+                raise InputError(f"{option}: found {value!r}, which is of recordings, and there are none")
+        return robot, []
 
     def solve(self, loaded: tuple[Robot, list[Recording]], progress: run.Progress) -> TorquePlan:
         from truing.dynamics import plan

@@ -27,6 +27,7 @@ PANEL = "Fleets"
 @dataclass(frozen=True, kw_only=True)
 class Command(FleetWork["FleetDynamics"]):
     doing = "summing"
+    torques = True
 
     source: RecordingFiles
     cutoff: CutOff = None

@@ -69,7 +69,7 @@ class Command(run.Command["Robot", "PerformancePlan"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Robot:
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
 
         return load_robot(self.robot, self.base_link, self.tip_link)
 

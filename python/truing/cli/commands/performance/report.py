@@ -80,7 +80,8 @@ class Command(run.Command[Loaded, "dict[str, Assessment]"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_commanded, load_measured, load_robot
+        from truing.cli.reading import load_robot
+        from truing.files import load_commanded, load_measured
 
         labels = self.labels or [path.stem for path in self.measured]
         if len(labels) != len(self.measured):

@@ -66,7 +66,7 @@ class Command(run.Command[Loaded, "TrackCalibration"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
         from truing.files.stream_file import load_imu, load_joints, load_plan, load_tool_poses, load_tracker
 
         robot = load_robot(self.robot, self.base_link, self.tip_link)

@@ -88,7 +88,7 @@ class Command(run.Command[Loaded, "Played"]):
     tip_link: TipLink = ""
 
     def load(self, progress: run.Progress) -> Loaded:
-        from truing.files import load_robot
+        from truing.cli.reading import load_robot
         from truing.files.stream_file import load_imu, load_joints, load_plan, load_setup, load_tracker
 
         robot = load_robot(self.robot, self.base_link, self.tip_link)
