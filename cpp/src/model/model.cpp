@@ -7,10 +7,13 @@
 #include <cmath>
 #include <functional>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 
+#include "math/near_names.hpp"
 #include "math/registration.hpp"
+#include "math/text.hpp"
+#include "model/effects/traits.hpp"
+#include "truing/model/effect_values.hpp"
 
 namespace truing::model {
 namespace {
@@ -169,20 +172,38 @@ std::set<std::string> effect_values(const Model& model, int owner) {
   return names;
 }
 
-/// Every value that the robot's effects carry is one that a law looks at: a misspelt one would do nothing.
+/// A value of effect `k` of the robot that no law looks at, in words: a misspelt one would do nothing. "": none.
+std::string unknown_value(const Model& model, std::size_t k, const std::set<std::string>& known) {
+  const AppliedEffect& applied = model.robot.effects[k];
+  for (const auto& [name, value] : applied.parameters) {
+    if (known.count(name)) continue;
+    const std::set<std::string> own = effect_values(model, static_cast<int>(k));
+    const std::vector<std::string> has(own.begin(), own.end());
+    return "effect '" + applied.effect + "' has a value '" + name + "', which its law does not look at" +
+           did_you_mean(name, has) + "; it has " + (has.empty() ? "none here" : listed(has));
+  }
+  return "";
+}
+
 void require_known_values(const Model& model) {
   if (model.robot.effects.empty()) return;
   const std::set<std::string> known = effect_values(model, -1);
   for (std::size_t k = 0; k < model.robot.effects.size(); ++k) {
-    const AppliedEffect& applied = model.robot.effects[k];
-    for (const auto& [name, value] : applied.parameters) {
-      if (known.count(name)) continue;
-      std::string has;
-      for (const std::string& own : effect_values(model, static_cast<int>(k))) has += (has.empty() ? "" : ", ") + own;
-      throw std::invalid_argument("effect '" + applied.effect + "' has a value '" + name +
-                                  "', which its law does not look at; it has " + (has.empty() ? "none here" : has));
-    }
+    const std::string text = unknown_value(model, k, known);
+    if (!text.empty()) throw std::invalid_argument(text);
   }
+}
+
+/// A row of zeros with every input that effects may ask for.
+Measurements row_of_zeros(const Robot& robot) {
+  static const double zero = 0.0;
+  const Column column{&zero, 0};
+  Measurements row;
+  row.rows = 1;
+  row.joints.assign(robot.driven_count(), column);
+  row.direction = row.joint_speed = row.joints;
+  row.payload = row.temperature = row.time = column;
+  return row;
 }
 
 double* geometry_value(Joint* joint, const std::string& name) {
@@ -220,8 +241,10 @@ int Model::parameter_index(const std::string& name) const {
   return -1;
 }
 
-Model make_model(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& requests,
-                 const std::vector<Effect>& own) {
+namespace {
+
+/// The model with the effects that the robot has, whatever their values are called.
+Model model_of(const Robot& robot, const Measurements& data, const std::vector<Effect>& own) {
   validate(robot);
   Model model;
   model.robot = robot;
@@ -271,6 +294,14 @@ Model make_model(const Robot& robot, const Measurements& data, const std::vector
   }
 
   for (const AppliedEffect& applied : robot.effects) add_request(&model, {applied.effect, applied.joints}, data, own);
+  return model;
+}
+
+}  // namespace
+
+Model make_model(const Robot& robot, const Measurements& data, const std::vector<EffectRequest>& requests,
+                 const std::vector<Effect>& own) {
+  Model model = model_of(robot, data, own);
   require_known_values(model);
   for (const EffectRequest& request : requests) add_request(&model, request, data, own);
   return model;
@@ -432,9 +463,10 @@ std::vector<int> find_parameters(const Model& model, const std::vector<std::stri
       if (matches(glob, model.parameters[k].name)) any = wanted[k] = true;
     }
     if (!any) {
-      std::ostringstream names;
-      for (const ParameterInfo& info : model.parameters) names << ' ' << info.name;
-      throw std::invalid_argument("no parameter matches '" + glob + "'; there are:" + names.str());
+      std::vector<std::string> names;
+      for (const ParameterInfo& info : model.parameters) names.push_back(info.name);
+      throw std::invalid_argument("no parameter matches '" + glob + "'" + did_you_mean(glob, names) +
+                                  "; there are: " + listed(names));
     }
   }
   std::vector<int> found;
@@ -445,3 +477,23 @@ std::vector<int> find_parameters(const Model& model, const std::vector<std::stri
 }
 
 }  // namespace truing::model
+
+namespace truing {
+
+std::vector<std::string> unknown_effect_values(const Robot& robot) {
+  std::vector<std::string> texts(robot.effects.size());
+  Robot known = robot;
+  const auto is_own = [](const AppliedEffect& e) { return model::effect_or_null(e.effect, {}) == nullptr; };
+  known.effects.erase(std::remove_if(known.effects.begin(), known.effects.end(), is_own), known.effects.end());
+  try {
+    const model::Model model = model::model_of(known, model::row_of_zeros(known), {});
+    const std::set<std::string> values = model::effect_values(model, -1);
+    for (std::size_t k = 0, at = 0; k < texts.size(); ++k) {
+      if (!is_own(robot.effects[k])) texts[k] = model::unknown_value(model, at++, values);
+    }
+  } catch (const std::invalid_argument&) {  // is said where the effects are used
+  }
+  return texts;
+}
+
+}  // namespace truing

@@ -63,6 +63,37 @@ void require_bounded(const std::string& urdf_text) {
   }
 }
 
+std::size_t links_from(const urdf::Link& link) {
+  std::size_t count = 1;
+  for (const urdf::LinkSharedPtr& child : link.child_links) count += links_from(*child);
+  return count;
+}
+
+// urdfdom takes a link that two joints hold, and passes over links that go round in a circle.
+void require_tree(const urdf::ModelInterface& model) {
+  for (const auto& [name, joint] : model.joints_) {
+    const urdf::JointSharedPtr& holder = model.getLink(joint->child_link_name)->parent_joint;
+    if (holder == joint) continue;
+    throw std::invalid_argument("link '" + joint->child_link_name + "' is the child of joint '" + name +
+                                "' and of joint '" + holder->name + "', expected one joint that holds it");
+  }
+  if (links_from(*model.getRoot()) == model.links_.size()) return;
+  for (const auto& [name, link] : model.links_) {
+    const urdf::Link* up = link.get();
+    for (std::size_t k = 0; up->getParent() && k < model.links_.size(); ++k) up = up->getParent().get();
+    if (!up->getParent()) continue;
+    throw std::invalid_argument("link '" + name + "' hangs on a circle of links, expected a tree below '" +
+                                model.getRoot()->name + "'");
+  }
+}
+
+// urdfdom takes such a link for one that weighs nothing.
+void require_inertials(const std::string& heard) {
+  if (heard.find("inertial element for Link") == std::string::npos) return;
+  throw std::invalid_argument("not a URDF that can be used: " + heard + " (a link whose mass is not known has no " +
+                              "<inertial>)");
+}
+
 urdf::ModelInterfaceSharedPtr parse(const std::string& urdf_text) {
   require_bounded(urdf_text);
   static std::mutex one_at_a_time;
@@ -82,6 +113,8 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& urdf_text) {
     throw std::invalid_argument("not a URDF that can be used: " +
                                 (listener.heard.empty() ? "the text holds no <robot>" : listener.heard));
   }
+  require_inertials(listener.heard);
+  require_tree(*model);
   return model;
 }
 

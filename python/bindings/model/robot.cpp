@@ -7,6 +7,8 @@
 #include "convert/text.hpp"
 #include "parts.hpp"
 #include "tables/model/robot.hpp"
+#include "truing/dynamics/effect_values.hpp"
+#include "truing/model/effect_values.hpp"
 
 namespace truing::python {
 
@@ -242,6 +244,9 @@ void bind_robot(py::module_& m) {
 The error names the joint and what is wrong: no joints, duplicate or empty names, unknown or circular `driven_by`,
 values that are not finite, an axis that is not of unit length, lower > upper, an inertia that is not symmetric, a
 negative rotor inertia, limits of speed or torque that are not above zero, torque_per_ampere of zero.)");
+  m.def("unknown_effect_values", &unknown_effect_values, py::arg("robot"),
+        "Of each of the robot's effects what is wrong with its values, in words: one that its law does not look at.");
+  m.def("unknown_torque_values", &unknown_torque_values, py::arg("robot"), "The same of its effects on torques.");
   m.def("forward_kinematics", &frames_of, py::arg("robot"), py::arg("q"), py::arg("target") = 0,
         R"(Frames of the links and of a target in the measurement frame, effects left out.
 

@@ -214,6 +214,7 @@ def load_robot(
         _core.validate_robot(robot)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
+    _check_values(document, robot)
     return robot
 
 
@@ -495,6 +496,17 @@ def _check_effects(
                         (key, i, "joints", k),
                         f"there is no joint {shown(joint)}; the joints are {listed(names)}",
                     )
+
+
+def _check_values(document: Document, robot: _core.Robot) -> None:
+    """A value that an effect's law does not look at would do nothing."""
+    for key, texts in (
+        ("effects", _core.unknown_effect_values(robot)),
+        ("torque_effects", _core.unknown_torque_values(robot)),
+    ):
+        for i, text in enumerate(texts):
+            if text:
+                document.refuse((key, i), text)
 
 
 # ---- Do the numbers look like the unit that the file names? --------------------------------------

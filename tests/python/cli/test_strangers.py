@@ -41,6 +41,16 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
             "effects: [{effect: backlahs, joints: [J1], parameters: {backlash.J1: 1e-4}}]",
             "effects[0] (backlahs) effect: there is no effect 'backlahs'; did you mean 'backlash'? there are",
         ),
+        (
+            "effects: [{effect: backlash, joints: [J1], parameters: {backlash.J2: 1e-4}}]",
+            "effects[0] (backlash): effect 'backlash' has a value 'backlash.J2', which its law does not look"
+            " at; did you mean 'backlash.J1'?",
+        ),
+        (
+            "torque_effects: [{effect: coulomb, joints: [J1, J2],"
+            " parameters: {coulomb.J1: 1, coulom.J2: 1}}]",
+            "torque_effects[0] (coulomb): effect 'coulomb' has a value 'coulom.J2'",
+        ),
     ],
 )
 def test_an_effect_that_would_do_nothing_is_refused_at_its_line(
@@ -71,6 +81,11 @@ def test_a_name_that_is_almost_one_is_answered_with_that_one(capsys: pytest.Capt
     Path("arm.yaml").write_text(ROBOT, encoding="utf-8")
     assert "did you mean 'identify'?" in refusal(capsys, "identfy", "arm.yaml")
     assert "did you mean 'diagnose'?" in refusal(capsys, "dynamics", "dignose")
+    assert main(["simulate", "arm.yaml", "--poses", "30", "--out", "sim"]) == 0
+    capsys.readouterr()
+    for option, word, meant in (("--free", "J1.alhpa", "J1.alpha"), ("--effects", "backlahs", "backlash")):
+        arguments = ("identify", "arm.yaml", "sim/measurements.csv", option, word, "--out", "out")
+        assert f"'{word}'" in (said := refusal(capsys, *arguments)) and f"did you mean '{meant}'?" in said
 
 
 def test_an_empty_path_is_no_folder(capsys: pytest.CaptureFixture[str]) -> None:

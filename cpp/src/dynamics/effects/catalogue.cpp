@@ -5,12 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "dynamics/effects/families.hpp"
 #include "dynamics/prepare.hpp"
 #include "dynamics/regressor.hpp"
 #include "kernel/rigid.hpp"
+#include "math/near_names.hpp"
 #include "math/text.hpp"
+#include "truing/dynamics/effect_values.hpp"
 
 namespace truing {
 using namespace dynamics;
@@ -44,6 +47,30 @@ bool has_any(const std::vector<TorqueTerm>& terms, const TorqueForm& form) {
   });
 }
 
+/// A misspelt value would do nothing.
+void require_known(const AppliedEffect& applied, const std::vector<TorqueTerm>& terms) {
+  std::set<std::string> known;
+  for (const TorqueTerm& term : terms) {
+    known.insert(term.parameter);
+    for (const auto& [name, value] : term.constants) known.insert(name);
+  }
+  for (const auto& [name, value] : applied.parameters) {
+    if (known.count(name)) continue;
+    const std::vector<std::string> has(known.begin(), known.end());
+    throw std::invalid_argument("effect '" + applied.effect + "' has a value '" + name +
+                                "', which its law does not look at" + did_you_mean(name, has) + "; it has " +
+                                listed(has));
+  }
+}
+
+MotionRange at_rest(const Robot& robot) {
+  MotionRange range;
+  const auto n = static_cast<Eigen::Index>(robot.driven_count());
+  range.lower = range.upper = range.speed = range.acceleration = range.torque = Eigen::VectorXd::Zero(n);
+  range.turns.resize(static_cast<std::size_t>(n));
+  return range;
+}
+
 }  // namespace
 
 const std::vector<TorqueEffect>& torque_catalogue() {
@@ -64,7 +91,8 @@ const TorqueEffect& find_torque_effect(const std::string& name, const std::vecto
   for (const auto* list : {&torque_catalogue(), &own}) {
     for (const TorqueEffect& effect : *list) names.push_back(effect.name);
   }
-  throw std::invalid_argument("there is no effect '" + name + "' on torques; there are: " + listed(names));
+  throw std::invalid_argument("there is no effect '" + name + "' on torques" + did_you_mean(name, names) +
+                              "; there are: " + listed(names));
 }
 
 std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robot, const MotionRange& given,
@@ -91,7 +119,24 @@ std::vector<TorqueTerm> terms_of(const AppliedEffect& applied, const Robot& robo
   if (out.empty()) {
     throw std::invalid_argument("effect '" + applied.effect + "' of the robot has no parameters that belong to it");
   }
+  require_known(applied, out);
   return out;
+}
+
+std::vector<std::string> unknown_torque_values(const Robot& robot) {
+  std::vector<std::string> texts;
+  for (const AppliedEffect& applied : robot.torque_effects) {
+    texts.emplace_back();
+    if (find(torque_catalogue(), applied.effect) == nullptr) continue;
+    try {
+      terms_of(applied, robot, at_rest(robot));
+    } catch (const MissingColumn&) {  // is said where the effect is used
+    } catch (const Unsuited&) {
+    } catch (const std::invalid_argument& error) {
+      texts.back() = error.what();
+    }
+  }
+  return texts;
 }
 
 namespace dynamics {
@@ -106,7 +151,8 @@ std::size_t driven_number(const Robot& robot, const std::string& joint) {
     names.push_back(driven_name(robot, k));
     if (names.back() == joint) return k;
   }
-  throw std::invalid_argument("there is no joint '" + joint + "' that has a reading; there are: " + listed(names));
+  throw std::invalid_argument("there is no joint '" + joint + "' that has a reading" + did_you_mean(joint, names) +
+                              "; there are: " + listed(names));
 }
 
 const std::string& driven_name(const Robot& robot, std::size_t joint) {

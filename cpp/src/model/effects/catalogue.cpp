@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "math/near_names.hpp"
 #include "math/text.hpp"
 #include "model/effects/families.hpp"
 #include "model/effects/traits.hpp"
@@ -130,7 +131,8 @@ const Effect& find_effect(const std::string& name, const std::vector<Effect>& ow
   for (const std::vector<Effect>* effects : {&catalogue(), &own}) {
     for (const Effect& effect : *effects) names.push_back(effect.name);
   }
-  throw std::invalid_argument("effect '" + name + "' does not exist; there are " + listed(names));
+  throw std::invalid_argument("effect '" + name + "' does not exist" + did_you_mean(name, names) + "; there are " +
+                              listed(names));
 }
 
 std::vector<Term> effect_terms(const std::vector<EffectRequest>& requests, const Robot& robot, const Measurements& data,
