@@ -414,14 +414,16 @@ class _Chain:
             T_link_tip = T_link_tip @ _frame(
                 self.m.site_pos[self.site], self._rotation(self.m.site_quat[self.site])
             )
+        joints = [self._joint(k) for k in range(len(self.moving))]
+        effects = self._torque_effects()
         try:
             robot = _core.Robot(
                 self._model_name() or default_name,
                 convention="urdf",
                 gravity=self._gravity(),
-                joints=[self._joint(k) for k in range(len(self.moving))],
+                joints=joints,
                 targets=[_core.Target("tool", T_link_tip)],
-                torque_effects=self._torque_effects(),
+                torque_effects=effects,
             )
             _core.validate_robot(robot)
         except ValueError as error:

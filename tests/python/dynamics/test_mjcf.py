@@ -152,6 +152,13 @@ def test_frames_are_mujocos(tmp_path: Path, tip: str) -> None:
         np.testing.assert_allclose(found[:3, :3], place.xmat.reshape(3, 3), rtol=0, atol=1e-13)
 
 
+def test_limits_in_the_wrong_order_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.replace('range="-2 1.5"', 'range="1.5 -2"'))
+    with pytest.raises(InputError, match="^[^:]+: joint '.*': its range is 1.5 to -2, expected the lower"):
+        truing.load_robot(path)
+
+
 def test_ranges_limits_and_names_come_over(tmp_path: Path) -> None:
     robot = load(tmp_path, ARM)
     first = robot.joint("A")
