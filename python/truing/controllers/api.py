@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.controllers import frames, lerobot, ros2_control, tf, ur_description, urdf, zeros
 from truing.controllers.distances import Dropped, dropped_effects, dropped_links, dropped_ratios
-from truing.controllers.frames import BRANDS, NamedFrame, inverse
+from truing.controllers.frames import BRANDS, NamedFrame, in_flange, inverse
 from truing.controllers.nearest import Freedom, Nearest, nearest
 from truing.controllers.written import Written
 from truing.errors import InputError
-from truing.files import Brand, load_robot
+from truing.files import FLANGE, Brand, last_to_flange, load_robot, says_flange
 from truing.files.common import PathLike, decoded, read_bytes, shown
 from truing.limits import UNIT_LENGTH_OFF
 from truing.rotations import rotations_from_quaternions
@@ -143,17 +143,20 @@ def _frames(calibration: Calibration, to: Format, options: ExportOptions) -> Wri
     named = list(calibration.frames)
     if calibration.robot is not None:
         robot = calibration.robot
+        T_last_flange = last_to_flange(robot) if says_flange(robot) else np.eye(4)
         if options.nominal is not None:
             found = nearest(options.nominal, robot, ())
-            robot = found.robot
+            robot, T_last_flange = found.robot, found.T_last_flange
             notes.append("frames with which the nominal robot comes nearest to the calibrated one")
         else:
             notes.append(
                 "frames of the calibrated robot: right for who uses its links; for a controller that keeps"
                 " its own name its robot (--nominal)"
             )
-        named = _of_robot(robot)
-        notes.append("tools stand in the frame after the last link: it has to be the maker's flange")
+        named = _of_robot(robot, T_last_flange)
+        said = options.nominal is not None or says_flange(robot)
+        where = "the robot's flange" if said else "the frame after the last link"
+        notes.append(f"tools stand in {where}: it has to be the maker's flange")
     if options.child:
         named[0] = NamedFrame(options.child, named[0].T, named[0].tool, named[0].about)
     if to == "tf":
@@ -180,10 +183,11 @@ def _frames(calibration: Calibration, to: Format, options: ExportOptions) -> Wri
     )
 
 
-def _of_robot(robot: _core.Robot) -> list[NamedFrame]:
+def _of_robot(robot: _core.Robot, T_last_flange: Floats) -> list[NamedFrame]:
     tools = [
-        NamedFrame(target.name, np.asarray(target.T_last_target), True, f"{target.name} in the flange")
+        NamedFrame(target.name, in_flange(target, T_last_flange), True, f"{target.name} in the flange")
         for target in robot.targets
+        if target.name != FLANGE
     ]
     T = np.asarray(robot.T_measurement_base)
     return [

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truing import _core
 from truing.controllers.written import Written, name_in_file, numbers
 from truing.files import NOTATIONS, Brand, frame_from_numbers, numbers_from_frame
 
@@ -45,6 +46,11 @@ def inverse(T: Floats) -> Floats:
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = T[:3, :3].T, -T[:3, :3].T @ T[:3, 3]
     return out
+
+
+def in_flange(target: _core.Target, T_last_flange: Floats) -> Floats:
+    """shape=(4, 4) [m] a target in the flange."""
+    return np.asarray(inverse(T_last_flange) @ target.T_last_target)
 
 
 def written(frames: Sequence[NamedFrame], brands: Sequence[Brand], notes: Sequence[str] = ()) -> Written:

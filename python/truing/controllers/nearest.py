@@ -14,22 +14,26 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truing import _core
 from truing.controllers.distances import Distance, between, poses_of, tools, without_effects
 from truing.errors import InputError
+from truing.files.flange import last_to_flange
 from truing.identification import identify
 
+Floats = NDArray[np.float64]
 Freedom = Literal["offset", "ratio"]
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """robot: the controller's, with what is to be entered. before: with tool and base alone; after: with
-    all.
+    """robot: the controller's, with what is to be entered. T_last_flange: the controller's flange in its last
+    joint's frame. before: with tool and base alone; after: with all.
     """
 
     robot: _core.Robot
+    T_last_flange: Floats
     before: Distance
     after: Distance
 
@@ -61,7 +65,7 @@ def nearest(nominal: _core.Robot, calibrated: _core.Robot, freedoms: Collection[
         ]
     found = _fitted(frames, data, ["base.*", "tool.*", *free]) if free else frames
     bare = calibrated.replace(targets=[calibrated.targets[0]])
-    return Nearest(found, between(bare, frames, poses), between(bare, found, poses))
+    return Nearest(found, last_to_flange(nominal), between(bare, frames, poses), between(bare, found, poses))
 
 
 def _check_same_robot(nominal: _core.Robot, calibrated: _core.Robot) -> None:

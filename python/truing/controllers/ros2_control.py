@@ -12,6 +12,7 @@ import numpy as np
 
 from truing import _core
 from truing.controllers.distances import between, dropped_effects, dropped_links, poses_of
+from truing.controllers.frames import in_flange
 from truing.controllers.nearest import Nearest
 from truing.controllers.written import Written, numbers
 from truing.report.words import escaped
@@ -45,7 +46,7 @@ def written(found: Nearest, calibrated: _core.Robot) -> Written:
                 for name in offsets
             },
             "T_measurement_base": np.asarray(robot.T_measurement_base).tolist(),
-            "T_flange_tool": np.asarray(robot.targets[0].T_last_target).tolist(),
+            "T_flange_tool": in_flange(robot.targets[0], found.T_last_flange).tolist(),
         },
         lines=[
             (name, f"offset {offsets[name]} {units[name]}, mechanical_reduction {reductions[name]}")

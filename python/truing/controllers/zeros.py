@@ -15,7 +15,7 @@ from importlib import resources
 
 from truing import _core
 from truing.controllers.distances import between, dropped_effects, dropped_links, dropped_ratios, poses_of
-from truing.controllers.frames import BRANDS, NamedFrame, inverse, printed
+from truing.controllers.frames import BRANDS, NamedFrame, in_flange, inverse, printed
 from truing.controllers.nearest import Nearest
 from truing.controllers.written import Written, numbers
 from truing.files import NOTATIONS
@@ -51,7 +51,7 @@ def written(found: Nearest, calibrated: _core.Robot) -> Written:
     lines[0] = (first, "none of its own: the base takes it")
     lines[-1] = (last, "none of its own: the tool takes it")
     frames = [
-        NamedFrame("tool", robot.targets[0].T_last_target, True, "tool in the flange"),
+        NamedFrame("tool", in_flange(robot.targets[0], found.T_last_flange), True, "tool in the flange"),
         NamedFrame("base", inverse(robot.T_measurement_base), False, "measurement frame in the robot's base"),
     ]
     notes = [

@@ -25,6 +25,12 @@ from truing.files.common import (
     write_table as write_table,
 )
 from truing.files.controller_parts import ControllerModel as ControllerModel
+from truing.files.flange import (
+    FLANGE as FLANGE,
+    last_to_flange as last_to_flange,
+    says_flange as says_flange,
+    with_flange as with_flange,
+)
 from truing.files.handeye_answer import (
     HandEyeAnswer as HandEyeAnswer,
     read_handeye_answer as read_handeye_answer,

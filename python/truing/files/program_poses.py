@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.errors import InputError, InputWarning
 from truing.files.brand_frames import Brand, frame_from_numbers
+from truing.files.flange import last_to_flange
 from truing.files.programs import Given, Place, Target, has_program_name, read_programs
 
 Floats = NDArray[np.float64]
@@ -32,13 +33,6 @@ def counts_j3_from_horizon(brand: Brand, robot: _core.Robot) -> bool:
         return False
     driven = [robot.joints[k].name for k in robot.driven_joints()]
     return not any(name == driven[1] for joint in robot.joints for name, _ in joint.driven_by)
-
-
-def last_to_flange(robot: _core.Robot) -> Floats:
-    """shape=(4, 4) [m] the controller's flange in the frame after the last joint. A URDF is read up to its
-    tip link, whose fixed joints the robot has as the place of its target.
-    """
-    return np.array(robot.targets[0].T_last_target) if robot.convention == "urdf" else np.eye(4)
 
 
 def is_program(path: Path) -> bool:

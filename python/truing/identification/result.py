@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
@@ -18,8 +19,18 @@ from numpy.typing import NDArray
 
 from truing import _core
 from truing.drawing import cause, differences, effects_of, robot_picture, tip_motion
-from truing.errors import InputError
-from truing.files import Looks, is_urdf, load_units, looks_of, save_robot, write_table
+from truing.errors import InputError, InputWarning
+from truing.files import (
+    Looks,
+    is_urdf,
+    load_robot,
+    load_units,
+    looks_of,
+    save_robot,
+    says_flange,
+    with_flange,
+    write_table,
+)
 from truing.identification.api import predict, residuals
 from truing.identification.page import identification_report, prediction_report
 from truing.report.charts import REJECTED
@@ -402,7 +413,7 @@ def write_robot(
     only the former). `stem`: another name."""
     save_robot(
         folder / f"{stem}.yaml",
-        robot,
+        robot if nominal_file is None else _with_flange(robot, nominal_file, base_link, tip_link),
         units=load_units(nominal_file) if nominal_file else None,
         calibration={
             "source": source,
@@ -417,6 +428,15 @@ def write_robot(
         (folder / f"{stem}.urdf").write_text(
             _core.urdf_with_calibration(text, robot, base_link, tip_link), encoding="utf-8"
         )
+
+
+def _with_flange(robot: _core.Robot, nominal_file: Path, base_link: str, tip_link: str) -> _core.Robot:
+    """With the flange of the nominal robot, if that is of a URDF or an MJCF."""
+    if robot.convention != "urdf" or says_flange(robot):
+        return robot
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # heard when it was read first
+        return with_flange(robot, load_robot(nominal_file, base_link, tip_link))
 
 
 def prediction_columns(

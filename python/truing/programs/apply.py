@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from truing.errors import InputError
 from truing.files.brand_frames import NOTATIONS, Brand, frame_from_numbers, numbers_from_frame
-from truing.files.program_poses import counts_j3_from_horizon, last_to_flange
+from truing.files.flange import last_to_flange
+from truing.files.program_poses import counts_j3_from_horizon
 from truing.files.programs import Given, Number, Reading, Stay, Target, edited, printed, read_programs
 from truing.inverse_kinematics import (
     CompensateOptions,
@@ -124,10 +125,10 @@ def apply_programs(
 ) -> Outcome:
     """Programs with literal targets replaced by what to command.
 
-    nominal: the robot as its controller believes it to be. real: as it was calibrated. The frame after the
-    last link of both is the controller's flange, their base its robot base; of a URDF it is the nominal
-    robot's tip link, which stands in both on the last joint's link alike. progress: called with targets
-    done. Raises InputError where no file can be used, and for robots that are not of six joints.
+    nominal: the robot as its controller believes it to be. real: as it was calibrated. The controller's
+    flange is the nominal robot's (`truing.files.last_to_flange`), and stands in both on the last joint's
+    link alike; their base is the controller's robot base. progress: called with targets done. Raises
+    InputError where no file can be used, and for robots that are not of six joints.
     """
     options = options or ApplyOptions()
     robots = _Robots(nominal, real, options)

@@ -78,6 +78,7 @@ FLOORS = {
         "boards",
         "opencv_file",
         "visp_file",
+        "flange",
         "program_poses",
         "other_poses",
         "handeye_answer",

@@ -24,7 +24,24 @@ from scipy.spatial.transform import Rotation
 import truing
 from truing.controllers import Calibration, ExportOptions, Format, export, load_result, nearest
 from truing.controllers.zeros import words
-from truing.files import ARMS, save_robot
+from truing.files import ARMS, last_to_flange, save_robot, with_flange
+
+TWO_JOINTS_AND_TOOL0 = """\
+<robot name="arm">
+  <link name="base"/><link name="upper"/><link name="hand"/><link name="tool0"/>
+  <joint name="j1" type="revolute">
+    <parent link="base"/><child link="upper"/><origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/>
+  </joint>
+  <joint name="j2" type="revolute">
+    <parent link="upper"/><child link="hand"/><origin xyz="0.2 0 0" rpy="1.5 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/>
+  </joint>
+  <joint name="to_tool0" type="fixed">
+    <parent link="hand"/><child link="tool0"/><origin xyz="0 0.05 0.1" rpy="0 1.5 0.2"/>
+  </joint>
+</robot>
+"""
 
 
 def arm(name: str = "ur5e") -> truing.Robot:
@@ -266,6 +283,26 @@ def test_frames_for_a_controller_that_keeps_its_links_take_what_they_can() -> No
         np.testing.assert_allclose(truing.forward_kinematics(entered, q)[-1], T, atol=1e-8)
     apart = exported(calibrated(), "frames", nominal=nominal)
     assert apart.dropped[0].size == apart.remaining.largest > 1e-3
+
+
+@pytest.mark.parametrize(("to", "alone"), [("frames", True), ("frames", False), ("zeros", False)])
+def test_tools_stand_in_the_flange_that_a_urdf_has_at_its_tip(
+    to: Format, alone: bool, tmp_path: Path
+) -> None:
+    """A calibrated robot keeps it in robot.yaml, where its tool is what was measured."""
+    (tmp_path / "arm.urdf").write_text(TWO_JOINTS_AND_TOOL0, encoding="utf-8")
+    nominal = truing.load_robot(tmp_path / "arm.urdf")
+    T_flange_tool = truing.frame_from_xyz_rpy([0.01, 0.02, 0.15], [0.1, 0.2, 0.3])
+    found = nominal.replace(targets=[truing.Target("tool", last_to_flange(nominal) @ T_flange_tool)])
+    save_robot(tmp_path / "robot.yaml", with_flange(found, nominal))
+    robot = truing.load_robot(tmp_path / "robot.yaml")
+    np.testing.assert_allclose(last_to_flange(robot)[:3, 3], [0.0, 0.05, 0.1])
+    out = exported(robot, to, **({} if alone else {"nominal": nominal}))
+    if to == "frames":
+        lines = [line for line in out.files["ur.txt"].splitlines() if line.startswith("set_tcp")]
+    else:
+        lines = re.findall(r"tool in the flange, ur</th><td>(.*?)</td>", out.files["zeros.html"])
+    np.testing.assert_allclose(scipy_frame("ur", numbers_of(lines[0])), T_flange_tool, atol=1e-6)
 
 
 # ---- tf ------------------------------------------------------------------------------------------

@@ -62,8 +62,8 @@ class Command(run.Command[Loaded, "Outcome"]):
     nominal: Annotated[
         Path,
         File(
-            "Robot as its controller believes it to be; the frame after its last link is the flange, of a"
-            " URDF its tip link.",
+            "Robot as its controller believes it to be; its flange is the controller's, of a URDF its tip"
+            " link.",
             metavar="ROBOT",
         ),
     ]

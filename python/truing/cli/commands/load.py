@@ -75,6 +75,7 @@ def _apart(one: ControllerModel, other: ControllerModel) -> float:
     import numpy as np
 
     from truing.errors import InputError
+    from truing.files import last_to_flange
     from truing.model import flange_poses
 
     count = one.robot.driven_count
@@ -84,7 +85,7 @@ def _apart(one: ControllerModel, other: ControllerModel) -> float:
             " are not files of one arm"
         )
     q = np.random.default_rng(count).uniform(-1.5, 1.5, (200, count))
-    first, second = flange_poses(one.robot, q), flange_poses(other.robot, q)
+    first, second = (flange_poses(m.robot, q) @ last_to_flange(m.robot) for m in (one, other))
     return float(np.linalg.norm(first[:, :3, 3] - second[:, :3, 3], axis=1).max())
 
 
