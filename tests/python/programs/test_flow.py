@@ -137,6 +137,36 @@ def test_why_a_tool_is_not_known_is_said_behind_loops_as_well(krl: Callable[[str
     assert {str(why) for why in found.values()} == {"FDAT_ACT is set to what is not in the files given: FP1"}
 
 
+RAPID_MOVE = "MoveAbsJ [[0,0,0,0,9,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v9,fine,tool0"
+FANUC_POINT = (
+    'P[1:"bin ]{"]{ GP1: UF : 0, UT : 0,\n'
+    "J1= 0 deg, J2= 0 deg, J3= 0 deg, J4= 0 deg, J5= 9 deg, J6= 0 deg };\n"
+)
+
+
+def fanuc(points: str, *moves: str) -> str:
+    return "\n".join(["/PROG A", "/MN", *moves, "/POS", points + "P[2]{ GP1: UF : 0, UT : 0, };", "/END", ""])
+
+
+def test_a_point_of_a_fanuc_that_the_program_computes_with_is_listed(tmp_path: Path) -> None:
+    text = fanuc(FANUC_POINT, "  1:J P[1] 50% FINE ;", "  2:  PR[4]=P[1:bin] ;", "  3:  P[1:bin]=P[1] ;")
+    stays = reading_of(tmp_path, "a.ls", text).stays
+    assert [(stay.line, stay.why) for stay in stays if "computes" in stay.why] == [
+        (4, "computes with P[1], which is changed"),
+        (5, "computes with P[1], which is changed"),
+    ]
+
+
+def test_pulses_are_not_taken_from_where_a_job_has_a_frame(tmp_path: Path) -> None:
+    """///RECTAN is missing: millimetres were taken for pulses."""
+    text = "/JOB\n//POS\n///TOOL 0\n///POSTYPE PULSE\n///PULSE\nC00000=0,0,0,0,900,0\n///USER 1\n"
+    text += "///POSTYPE USER\nC00001=500.0,0.0,400.0,180.0,0.0,0.0\n//INST\nMOVJ C00000\nMOVJ C00001\nEND\n"
+    (tmp_path / "a.jbi").write_text(text, encoding="ascii")
+    (reading,), _ = read_programs([tmp_path / "a.jbi"], Given(pulses=(1.0,) * 6))
+    assert [target.name for target in reading.targets] == ["C00000"]
+    assert [stay.why for stay in reading.stays] == ["its ///POSTYPE is USER, expected PULSE with ///PULSE"]
+
+
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
@@ -156,10 +186,28 @@ def test_why_a_tool_is_not_known_is_said_behind_loops_as_well(krl: Callable[[str
             "MODULE m\nPROC main()\nMoveAbsJ [[0,0,0,0,9,0],[9E9]],v9,fine,tool0;\nMoveL [[9",
             "line 4: .*no ; follows, expected one",
         ),
+        (
+            "inside.mod",
+            f"MODULE m\n{RAPID_MOVE}\n{RAPID_MOVE};\nENDMODULE\n",
+            "line 2: .*no ; follows, expected one",
+        ),
+        (
+            "open.mod",
+            f"MODULE m\n{RAPID_MOVE.replace(']]', ']', 1)};\nENDMODULE\n",
+            "line 2: .* do not close",
+        ),
+        ("cut_after.mod", f"MODULE m\nPROC main()\n{RAPID_MOVE};\n", "no ENDMODULE, and was cut off"),
+        ("open.src", f"DEF A()\nLIN {KRL_POINT[:-1]}\nEND\n", "line 2: .* do not close"),
+        ("cut.src", f"DEF A()\nLIN {KRL_POINT}\n", "no END, and was cut off"),
+        ("cut_after.script", f"def f():\n  movel({UR_POINT})\n", "a routine has no end"),
+        ("open.ls", fanuc(FANUC_POINT.replace("}", "")), "line 4: P.1. has no } at its end"),
+        ("cut.ls", fanuc(FANUC_POINT).replace("/END", ""), "no /END, and was cut off"),
+        ("cut.jbi", "/JOB\n//POS\n///TOOL 0\n///POSTYPE PULSE\n///PULSE\nC00000=0,0,0,0,0,0\n", "no //INST"),
+        ("cut_after.jbi", "/JOB\n//POS\n//INST\nNOP\nMOVJ C00000\n", "no END, and was cut off"),
     ],
 )
-def test_a_move_that_does_not_end_is_refused(tmp_path: Path, name: str, text: str, expected: str) -> None:
-    """It was passed over without a word: the target not corrected, or the tool not set."""
+def test_a_program_that_does_not_end_is_refused(tmp_path: Path, name: str, text: str, expected: str) -> None:
+    """It was passed over without a word: the target not corrected, the tool not set, or the rest left out."""
     path = tmp_path / name
     path.write_text(text, encoding="ascii")
     readings, refused = read_programs([path], Given())

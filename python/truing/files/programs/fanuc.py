@@ -14,14 +14,13 @@ from dataclasses import dataclass, field, replace
 
 from truing.errors import InputError
 from truing.files.programs.model import NOWHERE, Configuration, Found, Given, Place, Reading, Target
-from truing.files.programs.text import NUMBER, Number, Source
+from truing.files.programs.text import NUMBER, Number, Source, require_end
 
 _FLAGS = re.ASCII | re.IGNORECASE
 _POSE = ("X", "Y", "Z", "W", "P", "R")
 _JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
-_BLOCK = re.compile(
-    r"^[ \t]*P\[[ \t]*(\d+)[ \t]*(?::[^\]\r\n]*)?\][ \t]*\{(.*?)\}[ \t]*;?", _FLAGS | re.M | re.S
-)
+_COMMENT = r"(?::(?:\"[^\"\r\n]*\"|[^\]\r\n])*)?"  # of a point: [3:"over bin"]
+_BLOCK = re.compile(rf"^[ \t]*P\[[ \t]*(\d+)[ \t]*{_COMMENT}\][ \t]*\{{(?:([^{{}}]*)\}})?", _FLAGS | re.M)
 _GROUP = re.compile(r"\bGP(\d+)[ \t]*:", _FLAGS)
 _PLACES = re.compile(r"\bUF[ \t]*:[ \t]*(\w+)[ \t]*,[ \t]*UT[ \t]*:[ \t]*(\w+)", _FLAGS)
 _CONFIG = re.compile(r"\bCONFIG[ \t]*:[ \t]*'([^'\r\n]*)'", _FLAGS)
@@ -71,9 +70,10 @@ class _Fanuc:
     def read_points(self) -> None:
         for match in _BLOCK.finditer(self.text, *self.points_at):
             number = int(match[1])
-            if number in self.points:
+            if match[2] is None or number in self.points:
                 line = self.reading.sources[0].line(match.start())
-                raise InputError(f"{self.reading.sources[0].path}, line {line}: P[{number}] is there twice")
+                what = "is there twice" if number in self.points else "has no } at its end"
+                raise InputError(f"{self.reading.sources[0].path}, line {line}: P[{number}] {what}")
             self.points[number] = _Point(number, match.start(), match.start(2), match.end(2))
         for point in self.points.values():
             self._require_one_robot(point)
@@ -116,8 +116,19 @@ class _Fanuc:
                 if point is not None and point.assigned is None:
                     point.assigned = match.start(1) + assigned.start()
             move = _MOVE.match(body)
+            self._other_mentions(match.start(1), body, bool(move))
             if move:
                 previous = self._move(match.start(1), body, move, previous)
+
+    def _other_mentions(self, offset: int, body: str, is_move: bool) -> None:
+        """PR[1]=P[3]: the program computes with a point, which may be changed."""
+        if is_move:
+            return
+        for found in _SECOND.finditer(re.sub(r'"[^"]*"', "", body)):
+            number = self._point_number(found[1], found[2])
+            if number in self.points and not _ASSIGNED.match(body, found.start()):
+                shown = self.reading.sources[0].shown(offset, offset + len(body)).strip()
+                self.reading.stay(0, offset, shown, f"computes with P[{number}], which is changed")
 
     def _move(self, offset: int, body: str, move: re.Match[str], previous: int | None) -> int | None:
         """Returns the point that the robot is at afterwards, if it is known."""
@@ -280,6 +291,7 @@ def read(sources: Sequence[Source], given: Given) -> Reading:
     source = sources[0]
     if not re.search(r"^(?:\xef\xbb\xbf)?[ \t]*/PROG\b", source.text, _FLAGS | re.MULTILINE):
         raise InputError(f"{source.path}: no line starts with /PROG, expected a FANUC program as text")
+    require_end(source, source.text, "/END", r"^[ \t]*/END\b")
     reading = Reading("fanuc", list(sources))
     fanuc = _Fanuc(reading, given)
     fanuc.read_points()

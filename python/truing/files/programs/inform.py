@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 from truing.errors import InputError
 from truing.files.programs.model import NOWHERE, Configuration, Found, Given, Place, Reading, Target
-from truing.files.programs.text import Number, Source, numbers_of, trimmed
+from truing.files.programs.text import Number, Source, numbers_of, require_end, trimmed
 
 _FLAGS = re.ASCII | re.IGNORECASE
 _LINE = re.compile(r"[^\r\n]+")
@@ -200,6 +200,8 @@ class _Job:
         if position.uses and all(use.shifted for use in position.uses):
             return "only moves that SFTON shifts use it"
         if heading.form == "PULSE":
+            if heading.type not in ("", "PULSE"):
+                return f"its ///POSTYPE is {heading.type}, expected PULSE with ///PULSE"
             return "" if self.given.pulses else "is in pulses: --pulses says how many make a degree"
         if heading.form != "RECTAN":
             return "no ///PULSE or ///RECTAN says how it is meant"
@@ -227,6 +229,8 @@ def read(sources: Sequence[Source], given: Given) -> Reading:
     source = sources[0]
     if not re.search(r"^(?:\xef\xbb\xbf)?[ \t]*/JOB\b", source.text, _FLAGS | re.MULTILINE):
         raise InputError(f"{source.path}: no line starts with /JOB, expected a Yaskawa job")
+    require_end(source, source.text, "//INST", r"(?:^|\r)[ \t]*//INST\b")
+    require_end(source, source.text, "END", r"(?:^|\r)[ \t]*END[ \t]*(?:\r|$)")
     reading = Reading("yaskawa", list(sources))
     job = _Job(reading, given)
     job.read_lines()

@@ -26,7 +26,18 @@ from truing.files.programs.model import (
     Target,
     why_not_one,
 )
-from truing.files.programs.text import Number, Source, blanked, closing, number_at, pieces, trimmed
+from truing.files.programs.text import (
+    Number,
+    Source,
+    blanked,
+    closing,
+    is_closed,
+    number_at,
+    pieces,
+    require_end,
+    trimmed,
+    unclosed,
+)
 
 _FRAME = ("X", "Y", "Z", "A", "B", "C")
 _AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
@@ -353,6 +364,8 @@ class _Krl:
             self.reading.stay(source, start, self._shown(source, start, end), "a relative move")
             self.previous = None
             return
+        if not is_closed(code, start, end):
+            raise unclosed(self.reading.sources[source], start, end)
         tail = re.compile(r"(?<![\w$])WITH(?!\w)", _FLAGS).search(code, move.end(), end)
         stop = tail.start() if tail else end
         if tail:
@@ -533,6 +546,7 @@ def read(sources: Sequence[Source], given: Given) -> Reading:
     krl.declarations()
     for k in programs:
         krl.statements(k)
+        require_end(sources[k], krl.code[k], "END", r"(?:^|\r)[ \t]*END(FCT)?[ \t]*(?:\r|$)")
     krl.targets()
     if krl.elsewhere:
         reading.notes.append(

@@ -9,6 +9,7 @@ move or declared with CONST, PERS or VAR and never assigned. Tool and work objec
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -26,7 +27,18 @@ from truing.files.programs.model import (
     Target,
     why_not_one,
 )
-from truing.files.programs.text import Number, Source, blanked, closing, numbers_of, pieces, trimmed
+from truing.files.programs.text import (
+    Number,
+    Source,
+    blanked,
+    closing,
+    is_closed,
+    numbers_of,
+    pieces,
+    require_end,
+    trimmed,
+    unclosed,
+)
 
 _FLAGS = re.ASCII | re.IGNORECASE
 _NO_CODE = re.compile(r'"(?:[^"\r\n]|"")*"?|![^\r\n]*')
@@ -203,21 +215,29 @@ class _Rapid:
     def moves(self, source: int) -> None:
         code = self.code[source]
         displaced = re.search(r"\b(PDispOn|PDispSet|EOffsOn|EOffsSet)\b", code, _FLAGS)
-        for match in _MOVE.finditer(code):
-            line_start = max(code.rfind("\n", 0, match.start()), code.rfind("\r", 0, match.start()), 0)
-            before = code[max(line_start, code.rfind(";", 0, match.start())) : match.start()]
+        starts = [match for match in _MOVE.finditer(code) if self._begins(code, match.start())]
+        for match, after in itertools.zip_longest(starts, starts[1:]):
             end = code.find(";", match.end())
-            if end < 0 and match[1].lower() in _MOVES and _STARTS.search(before or "\n"):
+            beyond = after is not None and after[1].lower() in _MOVES and after.start() < end
+            if (end < 0 or beyond) and match[1].lower() in _MOVES:
                 said = self.reading.sources[source]
+                stop = after.start() if after is not None else len(code)
                 raise InputError(
-                    f"{said.path}, line {said.line(match.start())}: {said.shown(match.start(), len(code))}:"
+                    f"{said.path}, line {said.line(match.start())}: {said.shown(match.start(), stop)}:"
                     " no ; follows, expected one after the move: write the program anew if it was cut off"
                 )
-            if end < 0 or not _STARTS.search(before or "\n") or ":=" in code[match.end() : match.end() + 3]:
+            if end < 0 or ":=" in code[match.end() : match.end() + 3]:
                 continue
             if re.match(r"\s*[:(]", code[match.end() : end]):
                 continue
             self._move(source, match, end, displaced)
+
+    @staticmethod
+    def _begins(code: str, start: int) -> bool:
+        """Whether an instruction may stand here."""
+        line_start = max(code.rfind("\n", 0, start), code.rfind("\r", 0, start), 0)
+        before = code[max(line_start, code.rfind(";", 0, start)) : start]
+        return _STARTS.search(before or "\n") is not None
 
     def _move(self, source: int, match: re.Match[str], end: int, displaced: re.Match[str] | None) -> None:
         code, word = self.code[source], match[1]
@@ -228,6 +248,8 @@ class _Rapid:
                 self.reading.stay(source, match.start(), shown, f"the instruction {word} is not understood")
                 self.previous = None
             return
+        if not is_closed(code, match.start(), end):
+            raise unclosed(self.reading.sources[source], match.start(), end)
         places, tool_at = known
         arguments, work = self._arguments(source, match.end(), end)
         if displaced and word.lower() != "moveabsj":
@@ -441,7 +463,8 @@ def read(sources: Sequence[Source], given: Given) -> Reading:
     reading = Reading("abb", list(sources))
     rapid = _Rapid(reading, given)
     rapid.declarations()
-    for k in range(len(sources)):
+    for k, source in enumerate(sources):
         rapid.moves(k)
+        require_end(source, rapid.code[k], "ENDMODULE", r"\bENDMODULE\b")
     rapid.targets()
     return reading

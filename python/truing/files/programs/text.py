@@ -107,20 +107,49 @@ def blanked(text: str, pattern: re.Pattern[str]) -> str:
     return pattern.sub(spaces, text)
 
 
+_PAIRS = {"(": ")", "[": "]", "{": "}"}
+
+
 def closing(text: str, start: int) -> int | None:
     """Where the bracket that opens at `start` closes; None: nowhere."""
-    pairs = {"(": ")", "[": "]", "{": "}"}
     awaited: list[str] = []
     for position in range(start, min(len(text), start + 20_000)):
         letter = text[position]
-        if letter in pairs:
-            awaited.append(pairs[letter])
+        if letter in _PAIRS:
+            awaited.append(_PAIRS[letter])
         elif letter in ")]}":
             if not awaited or letter != awaited.pop():
                 return None
             if not awaited:
                 return position
     return None
+
+
+def is_closed(text: str, start: int, end: int) -> bool:
+    """Whether the brackets of a piece close in pairs."""
+    awaited: list[str] = []
+    for letter in text[start:end]:
+        if letter in _PAIRS:
+            awaited.append(_PAIRS[letter])
+        elif letter in ")]}" and (not awaited or letter != awaited.pop()):
+            return False
+    return not awaited
+
+
+def unclosed(source: Source, start: int, end: int) -> InputError:
+    """The error for a move whose brackets do not close in pairs."""
+    return InputError(
+        f"{source.path}, line {source.line(start)}: {source.shown(start, end)}: brackets do not close in"
+        " pairs, expected ( [ ] ): mend the line, or write the program anew if it was cut off"
+    )
+
+
+def require_end(source: Source, code: str, word: str, pattern: str) -> None:
+    """Programs are written whole: one without its end was cut off, and so may be what is left of its targets.
+    code: the text, comments blanked. Raises InputError.
+    """
+    if not re.search(pattern, code, re.ASCII | re.IGNORECASE | re.MULTILINE):
+        raise InputError(f"{source.path}: has no {word}, and was cut off: write the program anew")
 
 
 def pieces(text: str, start: int, end: int, separator: str = ",") -> list[tuple[int, int]]:

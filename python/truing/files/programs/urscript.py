@@ -17,7 +17,7 @@ from truing.errors import InputError
 from truing.files.brand_frames import frame_from_numbers
 from truing.files.programs.flow import Effects, Flow, Places, in_passes, the_only
 from truing.files.programs.model import NOWHERE, Found, Given, Place, Reading, Target, why_not_one
-from truing.files.programs.text import Number, Source, blanked, closing, numbers_of, pieces, trimmed
+from truing.files.programs.text import Number, Source, blanked, closing, numbers_of, pieces, trimmed, unclosed
 
 _FLAGS = re.ASCII
 _NO_CODE = re.compile(r'"[^"\r\n]*"?|#[^\r\n]*|^[ \t]*\$[^\r\n]*', re.MULTILINE)
@@ -144,6 +144,11 @@ class _Script:
             flow, kinds = Flow(unset, always, before), list[str]()
             for match in _EVENT.finditer(self.code):
                 self._event(match, flow, kinds, moves=moves)
+            if kinds:
+                path = self.reading.sources[0].path
+                raise InputError(
+                    f"{path}: a {kinds[-1]} has no end: write the program anew if it was cut off"
+                )
             return flow.found
 
         read(in_passes(read), moves=True)
@@ -153,12 +158,8 @@ class _Script:
         if match["move"]:
             end = closing(self.code, match.end())
             if end is None:
-                source = self.reading.sources[0]
-                shown = source.shown(match.start(), _end_of_line(self.code, match.start()))
-                raise InputError(
-                    f"{source.path}, line {source.line(match.start())}: {shown}: brackets do not close in"
-                    " pairs, expected ( [ ] ): mend the line, or write the program anew if it was cut off"
-                )
+                stop = _end_of_line(self.code, match.start())
+                raise unclosed(self.reading.sources[0], match.start(), stop)
             if moves or match["move"] == "set_tcp":
                 self._call(match, end, flow)
         elif match["opens"]:
