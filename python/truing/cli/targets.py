@@ -171,9 +171,11 @@ def print_reasons(result: Mapping[str, Any], title: str) -> None:
 
 
 def not_whole(result: Mapping[str, Any]) -> str:
-    """Why not every target is reached, or the path has gaps; "" if all is well."""
+    """Why not every target is reached, or the path has gaps or collides; "" if all is well."""
     missing = result["targets"] - result["reached"]
     gaps = len(result.get("path", {}).get("gaps", ()))
     words = [f"{missing} of {result['targets']} targets are not reached"] if missing else []
     words += [f"the path has {gaps} gap{'' if gaps == 1 else 's'}"] if gaps else []
+    collisions = len(result.get("path", {}).get("collisions", ()))
+    words += [f"the path collides between targets, {collisions} times"] if collisions else []
     return " and ".join(words)

@@ -23,3 +23,7 @@ from truing.inverse_kinematics.api import (
     inverse as inverse,
     inverse_path as inverse_path,
 )
+from truing.inverse_kinematics.between import (
+    ContactBetween as ContactBetween,
+    contacts_between as contacts_between,
+)

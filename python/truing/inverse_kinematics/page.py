@@ -126,14 +126,17 @@ def compensation_report(result: Mapping[str, Any], drawing: Drawing) -> str:
 
 
 def _verdict(result: Mapping[str, Any]) -> str:
-    whole = result["reached"] == result["targets"] and not result.get("path", {}).get("gaps")
+    path = result.get("path", {})
     label = (
-        "all reached"
-        if whole
-        else "not all reached"
+        "not all reached"
         if result["reached"] < result["targets"]
         else "path has gaps"
+        if path.get("gaps")
+        else "path collides"
+        if path.get("collisions")
+        else "all reached"
     )
+    whole = label == "all reached"
     return f'<span class="verdict {"found" if whole else "open"}">{label}</span>'
 
 
@@ -152,6 +155,8 @@ def _inverse_headline(result: Mapping[str, Any]) -> str:
             if path["continuous"]
             else f" The path has {counted(len(path['gaps']), 'gap')}."
         )
+        if path.get("collisions"):
+            first += f" Between targets it has {counted(len(path['collisions']), 'collision')}."
     worst = result["worst"]
     sub = "Each answer was put into the forward model again, with its effects, and its limits were looked at"
     sub += "; so was what is in its way. " if "scene" in result else ". "

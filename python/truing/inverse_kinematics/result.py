@@ -19,6 +19,7 @@ from truing import _core
 from truing.drawing import cause, differences, effects_of, robot_picture
 from truing.files import Looks, TargetData, write_table
 from truing.files.common import MOTIONS, joint_columns
+from truing.inverse_kinematics.between import contacts_between
 from truing.inverse_kinematics.page import Drawing, compensation_report, inverse_report
 from truing.report.arrays import subsample
 from truing.report.charts import AFTER
@@ -289,8 +290,23 @@ def inverse_dict(solved: Solved, *, warnings: Iterable[str] = ()) -> dict[str, A
         }
     if solved.path is not None and solved.steps is not None:
         found["path"] = _path(solved.path, solved.steps, solver.robot)
+        if not_empty(solver.options.scene):
+            found["path"]["collisions"] = _between(solved.path, solver)
     found["warnings"] = list(warnings)
     return found
+
+
+def _between(path: _core.JointPath, solver: _core.InverseSolver) -> list[dict[str, Any]]:
+    return [
+        {
+            "from": one.start,
+            "to": one.start + 1,
+            "first": one.first,
+            "second": one.second,
+            "distance_m": one.distance,
+        }
+        for one in contacts_between(path, solver)
+    ]
 
 
 def not_empty(scene: _core.Scene) -> bool:

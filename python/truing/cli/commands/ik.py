@@ -210,3 +210,9 @@ def print_path(path: Mapping[str, Any], *, slides: bool) -> None:
         size = f": {gap['joint']} would step {step}" if "step_rad" in gap or "step_m" in gap else ""
         lines.append(f"no continuous path from target {gap['from']} to {gap['to']}{size}")
     say_first(lines, 8, "more gaps: see the report")
+    lines = [
+        f"collision from target {one['from']} to {one['to']}: {one['first']} and {one['second']},"
+        f" {mm(one['distance_m'])} apart"
+        for one in path.get("collisions", ())
+    ]
+    say_first(lines, 8, "more collisions: see result.json")
