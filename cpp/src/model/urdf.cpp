@@ -188,6 +188,32 @@ std::vector<urdf::JointConstSharedPtr> joints_between(const urdf::ModelInterface
   return path;
 }
 
+bool is_below(const urdf::ModelInterface& model, const urdf::Link& base, const urdf::Link& tip) {
+  const urdf::Link* link = &tip;
+  while (link->name != base.name && link->parent_joint)
+    link = model.getLink(link->parent_joint->parent_link_name).get();
+  return link->name == base.name;
+}
+
+// Where a chain leaves what its base is fixed to.
+struct Start {
+  const urdf::Link* link;
+  Isometry3d T_base_link;
+};
+
+// The base itself, or of one beside the chain the link that it is fixed to: makers' URDFs have the frame in which the
+// controller counts as a leaf of its own.
+Start start_of(const urdf::ModelInterface& model, const urdf::Link& base, const urdf::Link& tip) {
+  Start start{&base, Isometry3d::Identity()};
+  while (!is_below(model, *start.link, tip)) {
+    const urdf::JointConstSharedPtr up = start.link->parent_joint;
+    if (!up || up->type != urdf::Joint::FIXED) return {&base, Isometry3d::Identity()};
+    start.T_base_link = start.T_base_link * frame_of(up->parent_to_joint_origin_transform).inverse();
+    start.link = model.getLink(up->parent_link_name).get();
+  }
+  return start;
+}
+
 // An arm with a gripper ends where its fingers part: the last link that all chains share, if anything moves before it.
 std::string where_they_part(const urdf::ModelInterface& model, const urdf::Link& base,
                             const std::vector<std::string>& ends) {
@@ -370,9 +396,10 @@ Chain read_chain(const std::string& urdf_text, const std::string& base_link, con
   Chain chain;
   chain.robot.name = model->getName();
   chain.robot.convention = Convention::urdf;
-  Isometry3d T_link_parent = Isometry3d::Identity();
+  const Start start = start_of(*model, *base, *tip);
+  Isometry3d T_link_parent = start.T_base_link;
   std::vector<urdf::JointConstSharedPtr> sources;
-  const std::vector<urdf::JointConstSharedPtr> path = joints_between(*model, *base, *tip);
+  const std::vector<urdf::JointConstSharedPtr> path = joints_between(*model, *start.link, *tip);
   std::vector<std::string> moving;
   for (const urdf::JointConstSharedPtr& source : path) {
     if (source->type != urdf::Joint::FIXED) moving.push_back(source->name);

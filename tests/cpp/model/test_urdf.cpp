@@ -170,6 +170,23 @@ TEST_CASE("a URDF chain is the product of its origins and motions, about any axi
   }
 }
 
+TEST_CASE("the base may stand beside the chain") {
+  const std::string text = replaced(arm, "<link name=\"bracket\"/>",
+                                    "<link name=\"bracket\"/><link name=\"controller\"/>"
+                                    "<joint name=\"counts\" type=\"fixed\"><parent link=\"base\"/>"
+                                    "<child link=\"controller\"/><origin xyz=\"0 0.1 0.33\" rpy=\"0.2 0 3\"/></joint>");
+  const Robot robot = truing::robot_from_urdf(text, "base", "tcp");
+  const Robot beside = truing::robot_from_urdf(text, "controller", "tcp");
+  const Isometry3d T_base_controller = origin(0, 0.1, 0.33, 0.2, 0, 3);
+  const VectorXd q = readings(0.7, 0.3, -1.1);
+  const auto frames = truing::forward_kinematics(robot, q), others = truing::forward_kinematics(beside, q);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    CHECK(frame_difference(frames[i], T_base_controller * others[i]) < 1e-14);
+  const Robot found = disturbed(beside);
+  const std::string written = truing::urdf_with_calibration(text, found, "controller", "tcp");
+  CHECK(worst_difference(truing::robot_from_urdf(written, "controller", "truing_tool"), found) < 1e-14);
+}
+
 TEST_CASE("limits, types and couplings come over") {
   const Robot robot = truing::robot_from_urdf(arm, "base", "flange");
   REQUIRE(robot.joints.size() == 4);

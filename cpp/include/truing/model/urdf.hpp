@@ -15,8 +15,9 @@ namespace truing {
 /// zero; `mimic` of a joint in the chain becomes `driven_by` with its multiplier.
 /// `<dynamics>` becomes the torque effects coulomb and viscous, those of a joint that mimics at the joint that drives
 /// it; velocity and effort of `<limit>` become speed_limit and torque_limit, zero, less, or 1e6 and more of either
-/// means none. Empty link names: the only root, the only leaf. Throws std::invalid_argument: not a URDF, unknown base
-/// or tip (lists the links there are), tip not below base, planar or floating joint.
+/// means none. A base may stand beside the chain, fixed to a link that has the tip below it: the controller's `base` of
+/// many arms does. Empty link names: the only root, the only leaf. Throws std::invalid_argument: not a URDF, unknown
+/// base or tip (lists the links there are), tip not below base nor below what it is fixed to, planar or floating joint.
 Robot robot_from_urdf(const std::string& urdf_text, const std::string& base_link = "",
                       const std::string& tip_link = "");
 
