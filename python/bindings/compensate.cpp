@@ -108,16 +108,19 @@ seed: shape=(driven joints,) [rad | m], where the robot comes from; it decides t
   cls.def(
       "joints",
       [](const Compensator& c, const Eigen::VectorXd& program, const std::optional<Eigen::VectorXd>& seed,
-         const std::optional<Conditions>& conditions) {
+         const std::optional<Conditions>& conditions, const std::optional<Task>& like) {
         const Joints wanted = joints_from(program);
         const Joints from = seed ? joints_from(*seed) : wanted;
+        const Task task = like.value_or(Task{});
         const py::gil_scoped_release unlocked;
-        return c.joints(wanted, from, conditions ? &*conditions : nullptr);
+        return c.joints(wanted, from, conditions ? &*conditions : nullptr, task);
       },
-      py::arg("program"), py::arg("seed") = py::none(), py::arg("conditions") = py::none(),
+      py::arg("program"), py::arg("seed") = py::none(), py::arg("conditions") = py::none(), py::kw_only(),
+      py::arg("like") = py::none(),
       R"(A joint position of a program, shape=(driven joints,) [rad | m]: the nominal robot's pose there is the target.
 
-seed: where the robot comes from; None: it stands there already. Raises InputError.)");
+seed: where the robot comes from; None: it stands there already. like: what of that pose is asked for; None: all of
+it. Raises InputError.)");
 }
 
 /// Many targets.
@@ -142,21 +145,24 @@ void bind_batches(CompensatorClass& cls) {
       "One result per target; arguments as of `InverseSolver.solve_batch`. Raises InputError.");
   cls.def(
       "joints_batch",
-      [](const Compensator& c, const ArrayLike& given_program, const GivenConditions& given, int threads,
-         const Callback& callback) {
+      [](const Compensator& c, const ArrayLike& given_program, const GivenConditions& given,
+         const std::optional<Task>& like, int threads, const Callback& callback) {
+        const Task task = like.value_or(Task{});
         const std::vector<Joints> program = joint_rows(given_program, c.nominal().driven_count(), "program");
         const std::vector<Conditions> conditions = conditions_from(given);
         if (!conditions.empty()) require_one_or_each(conditions.size(), program.size(), "conditions");
-        return Compensations{
-            with_progress(callback,
-                          [&](const auto& progress) { return c.joints_batch(program, conditions, threads, progress); }),
-            c.nominal().driven_count()};
+        return Compensations{with_progress(callback,
+                                           [&](const auto& progress) {
+                                             return c.joints_batch(program, conditions, threads, progress, task);
+                                           }),
+                             c.nominal().driven_count()};
       },
-      py::arg("program"), py::arg("conditions") = py::none(), py::kw_only(), py::arg("threads") = 0,
-      py::arg("progress") = py::none(),
+      py::arg("program"), py::arg("conditions") = py::none(), py::kw_only(), py::arg("like") = py::none(),
+      py::arg("threads") = 0, py::arg("progress") = py::none(),
       R"(One result per row of a program of joint positions, shape=(n, driven joints) [rad | m].
 
-The robot comes from the row before; to the first it does not move. Raises InputError.)");
+The robot comes from the row before; to the first it does not move. like: what of the nominal robot's poses is asked
+for; None: all of them. Raises InputError.)");
 }
 
 }  // namespace

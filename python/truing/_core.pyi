@@ -4749,17 +4749,19 @@ class Compensator:
         ...
     def __repr__(self) -> str:
         ...
-    def joints(self, program: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Compensated:
+    def joints(self, program: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None, *, like: Task | None = None) -> Compensated:
         """
         A joint position of a program, shape=(driven joints,) [rad | m]: the nominal robot's pose there is the target.
         
-        seed: where the robot comes from; None: it stands there already. Raises InputError.
+        seed: where the robot comes from; None: it stands there already. like: what of that pose is asked for; None: all of
+        it. Raises InputError.
         """
-    def joints_batch(self, program: numpy.typing.ArrayLike, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Compensations:
+    def joints_batch(self, program: numpy.typing.ArrayLike, conditions: Conditions | collections.abc.Sequence[Conditions] | None = None, *, like: Task | None = None, threads: typing.SupportsInt | typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> Compensations:
         """
         One result per row of a program of joint positions, shape=(n, driven joints) [rad | m].
         
-        The robot comes from the row before; to the first it does not move. Raises InputError.
+        The robot comes from the row before; to the first it does not move. like: what of the nominal robot's poses is asked
+        for; None: all of them. Raises InputError.
         """
     def pose(self, task: Task, seed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None, conditions: Conditions | None = None) -> Compensated:
         """

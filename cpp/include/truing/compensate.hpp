@@ -67,9 +67,10 @@ class Compensator {
 
   /// A pose of a program. `seed`: where the robot comes from; it decides the configuration, and of backlash the side.
   Compensated pose(const Task& task, const Joints& seed, const Conditions* conditions = nullptr) const;
-  /// A joint position of a program: the nominal robot's pose there is what is wanted. The configuration stays, or the
-  /// target is not reached.
-  Compensated joints(const Joints& program, const Joints& seed, const Conditions* conditions = nullptr) const;
+  /// A joint position of a program: the nominal robot's pose there is what is wanted, all of it or what `like` asks
+  /// for; arms of less than six joints seldom have all of it. The configuration stays, or the target is not reached.
+  Compensated joints(const Joints& program, const Joints& seed, const Conditions* conditions = nullptr,
+                     const Task& like = {}) const;
 
   /// One result per task, the same for any number of threads; seeds, conditions and progress as in
   /// InverseSolver::solve_batch.
@@ -79,7 +80,8 @@ class Compensator {
   /// One result per joint position of a program; the robot comes from the one before, to the first it does not move.
   std::vector<Compensated> joints_batch(const std::vector<Joints>& program,
                                         const std::vector<Conditions>& conditions = {}, int threads = 0,
-                                        const std::function<bool(std::size_t)>& progress = {}) const;
+                                        const std::function<bool(std::size_t)>& progress = {},
+                                        const Task& like = {}) const;
 
  private:
   struct Impl;

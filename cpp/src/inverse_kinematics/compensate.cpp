@@ -192,11 +192,12 @@ Compensated Compensator::pose(const Task& task, const Joints& seed, const Condit
   return out;
 }
 
-Compensated Compensator::joints(const Joints& program, const Joints& seed, const Conditions* conditions) const {
+Compensated Compensator::joints(const Joints& program, const Joints& seed, const Conditions* conditions,
+                                const Task& like) const {
   const Conditions& given = conditions ? *conditions : impl_->conditions;
   Conditions own;
   const Conditions* with = impl_->with_direction(given, seed, program, &own);
-  Task task;
+  Task task = like;
   task.T_measurement_target = impl_->nominal.forward(program, with);
   if (impl_->options.in_base) {
     task.T_measurement_target = impl_->calibrated.robot().T_measurement_base *
@@ -228,11 +229,12 @@ std::vector<Compensated> Compensator::pose_batch(const std::vector<Task>& tasks,
 
 std::vector<Compensated> Compensator::joints_batch(const std::vector<Joints>& program,
                                                    const std::vector<Conditions>& conditions, int threads,
-                                                   const std::function<bool(std::size_t)>& progress) const {
+                                                   const std::function<bool(std::size_t)>& progress,
+                                                   const Task& like) const {
   if (!conditions.empty()) require_one_or_each("conditions", conditions.size(), program.size());
   std::vector<Compensated> results(program.size());
   for_each_on_threads(program.size(), threads, progress, [&](std::size_t k) {
-    results[k] = joints(program[k], program[k == 0 ? 0 : k - 1], one_or_each(conditions, k));
+    results[k] = joints(program[k], program[k == 0 ? 0 : k - 1], one_or_each(conditions, k), like);
   });
   return results;
 }

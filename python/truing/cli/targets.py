@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -20,7 +21,7 @@ from truing.cli.options import (
     words_of,
 )
 from truing.cli.tables import say, say_first
-from truing.errors import InputError
+from truing.errors import InputError, InputWarning
 
 if TYPE_CHECKING:
     import numpy as np
@@ -168,6 +169,21 @@ def print_reasons(result: Mapping[str, Any], title: str) -> None:
     say(title + (f" ({', '.join(others)})" if others else ""))
     failures: Sequence[Mapping[str, Any]] = result["failures"]
     say_first([f"target {f['target']}: {f['text']}" for f in failures], 8, "more: see joints.csv")
+
+
+WHOLE_POSE = 6  # coordinates, and joints that it takes
+
+
+def warn_of_few_joints(robot: Robot, kinds: Iterable[str], reached: NDArray[np.bool_]) -> None:
+    """Another arm's whole poses are out of reach of one with few joints wherever they are."""
+    few = robot.driven_count < WHOLE_POSE
+    if few and not reached.all() and "pose" in kinds:
+        warnings.warn(
+            f"{robot.name} has {robot.driven_count} driven joints, and a whole pose takes {WHOLE_POSE}: say"
+            " what of it is wanted, --task torch (position and the direction of one axis) or --task point",
+            InputWarning,
+            stacklevel=2,
+        )
 
 
 def not_whole(result: Mapping[str, Any]) -> str:

@@ -144,7 +144,8 @@ def compensate(
 
     nominal: the controller's model. calibrated: what `identify` found. targets: as in `inverse`; or, with
     `program`, joint positions, shape=(n, driven joints) [rad | m], at which the nominal robot's poses are the
-    targets. A file with joints and no poses is a program.
+    targets. A file with joints and no poses is a program. Arms of less than six joints can seldom be given
+    back whole poses: kind says what of them is wanted.
     kind, seeds, conditions, target, threads, progress: as in `inverse`. The seed decides the configuration.
     in_base: poses and commands are in each robot's own base frame, as programs have them; else in the
     measurement frame.
@@ -156,19 +157,16 @@ def compensate(
     given = _conditions(targets, conditions)
     chosen = _core.CompensateOptions(inverse=made(_core.InverseOptions, options), in_base=in_base)
     maker = Compensator(nominal, calibrated, chosen, _first(given), target=target)
+    like = Task(np.eye(4), kind=kind)
     if uncertainty is not None:
         maker.set_uncertainty(uncertainty.names, uncertainty.values, uncertainty.covariance)
     if program or isinstance(targets, TargetData) and targets.is_program:
-        if kind != "pose":
-            raise InputError(
-                f"kind: found {kind!r}, expected 'pose': a program of joint positions wants those"
-            )
-        return maker.joints_batch(_program(targets), given, threads=threads, progress=progress)
+        return maker.joints_batch(_program(targets), given, like=like, threads=threads, progress=progress)
     return maker.pose_batch(
         _tasks(targets),
         _seeds(targets, seeds),
         given,
-        like=Task(np.eye(4), kind=kind),
+        like=like,
         threads=threads,
         progress=progress,
     )

@@ -400,6 +400,23 @@ def test_a_program_of_joints_is_compensated(capsys: pytest.CaptureFixture[str]) 
     assert list(columns("found/poses.csv")) == [*NAMES, "other_configuration", "status"]
 
 
+def test_a_program_of_an_arm_of_five_joints_says_what_to_ask_for(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = irb().replace(joints=irb().joints[:5])
+    truing.save_robot("five.yaml", arm)
+    truing.save_robot("real.yaml", calibrated(arm, 5))
+    program = usual_joints(12, seed=10)[:, :5]
+    write(
+        Path("program.csv"),
+        {f"q{k + 1}_deg": [repr(float(v)) for v in np.degrees(program[:, k])] for k in range(5)},
+    )
+    code, result = run("compensate", "five.yaml", "real.yaml", "program.csv")
+    assert code == 1 and result["reached"] == 0
+    assert "has 5 driven joints, and a whole pose takes 6" in result["warnings"][0]
+    code, result = run("compensate", "five.yaml", "real.yaml", "program.csv", "--task", "torch")
+    assert code == 0 and result["reached"] == 12 and not result["warnings"]
+    capsys.readouterr()
+
+
 def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
     real = calibrated(irb(), 5).replace(
         T_measurement_base=truing.frame_from_xyz_rpy([1.0, 2.0, 0.5], [0.01, 0.02, 1.0])
@@ -479,8 +496,8 @@ def test_commands_in_the_base_frame(capsys: pytest.CaptureFixture[str]) -> None:
             "--seed: a program of joint positions",
         ),
         (
-            ["compensate", ROBOT, ROBOT, "program.csv", "--task", "torch"],
-            "--task: a program of joint positions wants the whole poses",
+            ["compensate", ROBOT, ROBOT, "program.csv", "--retreat", "5mm"],
+            "--retreat: a program of joint positions is given back where it is",
         ),
         (["compensate", ROBOT, ROBOT, "empty.csv"], "empty.csv: is empty"),
     ],

@@ -10,6 +10,7 @@ import functools
 import math
 import pickle
 import threading
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -31,7 +32,6 @@ from inverse_arms import (
     with_effects,
     wrapped,
 )
-from truing import InputError
 from truing.examples import example
 from truing.inverse_kinematics import (
     Compensator,
@@ -633,8 +633,6 @@ def test_the_real_robot_goes_where_it_is_wanted(in_base: bool) -> None:
 def test_a_program_of_joints_keeps_its_configuration() -> None:
     nominal, real = irb(), calibrated(irb(), 9)
     program = random_joints(nominal, 80, seed=24, share=0.9)
-    with pytest.raises(InputError, match="kind: found 'torch', expected 'pose'"):
-        truing.compensate(nominal, real, program, program=True, kind="torch")
     made = truing.compensate(nominal, real, program, program=True)
     joints = made.solutions.joints
     for k in np.flatnonzero(made.solutions.reached):
@@ -645,6 +643,26 @@ def test_a_program_of_joints_keeps_its_configuration() -> None:
     )  # beside singularities joints are far apart by necessity
     assert usual.sum() > 50 and not made.other_configuration[usual].any()
     assert np.abs(joints - program)[usual].max() < 0.5 and np.median(np.abs(joints - program)[usual]) < 0.02
+
+
+@pytest.mark.parametrize(("joints", "kind"), [(5, "torch"), (4, "point")])
+def test_a_program_of_joints_of_few_axes_is_given_back_what_they_can(
+    joints: int, kind: Literal["torch", "point"]
+) -> None:
+    """Four or five joints reach whole poses of another arm nowhere; the place of the tool they do."""
+    arm = irb().replace(joints=irb().joints[:joints])
+    nominal, real = arm, calibrated(arm, 12)
+    program = random_joints(nominal, 60, seed=28, share=0.7)
+    whole = truing.compensate(nominal, real, program, program=True)
+    assert not whole.solutions.reached.any()
+    made = truing.compensate(nominal, real, program, program=True, kind=kind)
+    assert made.solutions.reached.mean() > 0.9 and made.other_configuration.mean() < 0.1
+    for k in np.flatnonzero(made.solutions.reached):
+        wanted = truing.forward_kinematics(nominal, program[k])[-1]
+        found = truing.forward_kinematics(real, made.solutions.joints[k])[-1]
+        assert position_off(found, wanted) <= 1.001 * TOLERANCE
+        assert kind == "point" or np.linalg.norm(np.cross(found[:3, 2], wanted[:3, 2])) <= 1.001 * TOLERANCE
+        assert position_off(truing.forward_kinematics(real, program[k])[-1], wanted) > 1e-5
 
 
 def test_near_the_wrist_singularity_compensation_is_right_or_labelled() -> None:

@@ -32,6 +32,7 @@ from truing.cli.targets import (
     print_reasons,
     seed_joints,
     target_index,
+    warn_of_few_joints,
 )
 from truing.errors import InputError, InputWarning
 
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from truing.files import TargetData
-    from truing.inverse_kinematics import Compensations, Compensator
+    from truing.inverse_kinematics import Compensations, Compensator, Task
     from truing.model import Robot
 
 PANEL = "Inverse kinematics"
@@ -50,6 +51,7 @@ class Loaded:
     data: TargetData
     compensator: Compensator
     start: NDArray[Any] | None
+    like: Task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,14 +120,11 @@ class Command(run.Command[Loaded, "Compensations"]):
         start = None if data.is_program else seed_joints(self.seed, believed, data)
         if data.is_program and self.seed:
             raise InputError("--seed: a program of joint positions says itself where the robot comes from")
-        for name in ("task", "free_axis", "retreat") if data.is_program else ():
-            if getattr(self, name) not in (None, "pose", "none"):
-                option = f"--{name.replace('_', '-')}"
-                raise InputError(
-                    f"{option}: a program of joint positions wants the whole poses that they bring the"
-                    " tool to: leave it out, or give poses"
-                )
-        return Loaded(data, self._compensator(believed, real, data, index), start)
+        if data.is_program and self.retreat:
+            raise InputError(
+                "--retreat: a program of joint positions is given back where it is, or not at all"
+            )
+        return Loaded(data, self._compensator(believed, real, data, index), start, like)
 
     def _robots(self) -> tuple[Robot, Robot]:
         from truing.cli.reading import load_robot
@@ -167,12 +166,17 @@ class Command(run.Command[Loaded, "Compensations"]):
         conditions = data.conditions or None
         if data.is_program:
             assert data.joints is not None
-            return loaded.compensator.joints_batch(
-                data.joints, conditions, threads=self.threads, progress=count
+            kinds = {loaded.like.kind}
+            found = loaded.compensator.joints_batch(
+                data.joints, conditions, like=loaded.like, threads=self.threads, progress=count
             )
-        return loaded.compensator.pose_batch(
-            data.tasks, loaded.start, conditions, threads=self.threads, progress=count
-        )
+        else:
+            kinds = {task.kind for task in data.tasks}
+            found = loaded.compensator.pose_batch(
+                data.tasks, loaded.start, conditions, threads=self.threads, progress=count
+            )
+        warn_of_few_joints(loaded.compensator.calibrated.robot, kinds, found.solutions.reached)
+        return found
 
     def write(
         self, folder: Path, loaded: Loaded, found: Compensations, warnings: list[str]

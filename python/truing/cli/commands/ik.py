@@ -30,6 +30,7 @@ from truing.cli.targets import (
     print_reasons,
     seed_joints,
     target_index,
+    warn_of_few_joints,
 )
 from truing.errors import InputError
 
@@ -138,6 +139,7 @@ class Command(run.Command[Loaded, "Solved"]):
             threads=self.threads,
             progress=progress.counting(data.count),
         )
+        warn_of_few_joints(solver.robot, {task.kind for task in data.tasks}, found.reached)
         return Solved(data, solver, list(found), np.arange(data.count))
 
     def _path(self, loaded: Loaded, progress: run.Progress) -> Solved:
