@@ -152,6 +152,7 @@ enum class HandEyeConcernKind {
   noise_of_one_side,  ///< position noise was given of hand or board alone: it was not used
   noise_too_small,    ///< poses scatter by `value` times the noise that was given
   board_scale,        ///< the loop closes best with lengths of board poses times `value`, standard error `reference`
+  other_lens,         ///< pixels scatter by `value` [px] with the lens as given, by `reference` with one that fits them
   behind_camera,      ///< `value` of `reference` boards are not in front of the camera
 };
 /// What a warning is about, with its numbers.
@@ -209,7 +210,8 @@ struct HandEyeResult {
   Eigen::Matrix<double, 8, 1> singular_values = Eigen::Matrix<double, 8, 1>::Zero();
   double singular_gap = 0.0;  ///< sixth over seventh singular value: how clearly two null vectors stand out
   double axes_spread = 0.0;   ///< second over first principal rotation of the motions: 0 one axis, 1 two alike
-  double board_scale = 1.0;   ///< factor on the board's lengths that would fit best; 1: as given
+  /// Factor on the board's lengths that would fit best; 1: as given. With status `not closing` the loop closes with it.
+  double board_scale = 1.0;
   double board_scale_sigma = kEstimate;    ///< standard error of `board_scale`; NaN: not known
   Reading as_given;                        ///< closure of the poses as they are; with status `not closing` alone
   std::vector<Reading> readings;           ///< other readings that close, best first; with status `not closing` alone

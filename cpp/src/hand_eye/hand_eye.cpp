@@ -12,6 +12,7 @@
 #include "hand_eye/errors.hpp"
 #include "hand_eye/images.hpp"
 #include "hand_eye/left_out.hpp"
+#include "hand_eye/lengths.hpp"
 #include "hand_eye/readings.hpp"
 #include "hand_eye/refine.hpp"
 #include "hand_eye/small_sample.hpp"
@@ -34,11 +35,15 @@ constexpr double kOverNoise = 3.0;      // and no less than so many times the no
 constexpr double kLargestNoise = 0.01;  // [rad] angle noise beyond this is a wrong reading, not noise
 constexpr double kDoubtful =
     0.02;  // closures beyond this, rad or fractions of the motion's size, make us try other readings
-constexpr double kHopeless = 0.2;  // and beyond this nothing is said
-constexpr double kWidest = 0.1;    // standard errors beyond this fraction of the distance, or rad, are not an answer
-constexpr double kExact = 1e-8;    // [m], [rad] closures below this are rounding, not noise
+constexpr double kHopeless = 0.2;    // and beyond this nothing is said
+constexpr double kScattered = 0.05;  // [rad] no robot and no camera turn by so much as noise: motions are not to blame
+constexpr double kWidest = 0.1;      // standard errors beyond this fraction of the distance, or rad, are not an answer
+constexpr double kExact = 1e-8;      // [m], [rad] closures below this are rounding, not noise
 constexpr double kBeyondPixels = 3.0;  // times what pixels can tell of a board's orientation: more is not theirs
 constexpr double kEvidence = 4.0;      // and in log likelihood over a robot that turns: what says less is the robot's
+constexpr double kOtherLens = 1.5;     // times the variance of pixels with the lens that fits them best is said
+constexpr double kFinest = 1e-3;       // [px] no camera sees better
+constexpr double kCertainLens = 10.0;  // and so many times what noise alone gains by a lens (F ratio)
 constexpr double kBentLens = 1.2;  // a lens whose pixels scatter with no more than this times the variance fits as well
 constexpr int kRejectRounds = 10;
 constexpr double kCertainScale = 4.0;  // standard errors from 1: a factor on the board's lengths is said
@@ -412,7 +417,7 @@ void widen(const LoopNoise& noise, const Rows& rows, LoopEstimate* fit, HandEyeR
 /// [m] root mean square of the closures with the board's lengths times `scale`, fitted anew.
 double closure_with_lengths_times(double scale, const HandEyeOptions& options, const Work& work) {
   LoopProblem problem = work.problem;
-  for (Eigen::Isometry3d& T : problem.B) T.translation() *= scale;
+  problem.B = with_lengths_times(scale, problem.B);
   const LoopEstimate fit =
       refine_loop(problem, work.fitted, work.fit.X, work.fit.Y, work.fit.noise, options.max_iterations);
   double sum = 0.0;
@@ -548,6 +553,24 @@ std::vector<Reading> other_readings(const HandEyeOptions& options, const Work& w
   return readings;
 }
 
+void refuse_open_loop(const HandEyeOptions& options, const Agreement& agreement, HandEyeResult* result) {
+  result->status = HandEyeStatus::not_closing;
+  result->as_given = {"", "", agreement.position, agreement.rotation, false};
+  result->message = not_closing_message(*result, options.setup);
+}
+
+/// Centimetres for millimetres and the like: the factor, where the loop closes with it.
+void try_board_lengths(const Work& work, const Rows& rows, const Agreement& agreement, double size,
+                       HandEyeResult* result) {
+  const double factor = factor_on_lengths(work.problem.M, work.problem.B, rows);
+  if (!std::isfinite(factor)) return;
+  const Agreement other = find_agreement(work.problem.M, with_lengths_times(factor, work.problem.B), rows,
+                                         work.poses.board_symmetries, CameraSolver{}, {true, 200});
+  if (other.position < kDoubtful * size && other.position < kDoubtful * agreement.position &&
+      other.rotation < kLargestNoise)
+    result->board_scale = factor;
+}
+
 /// False: there is no answer, and the result says why. `angles_differ`: hand and board turn by different angles.
 bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, const Agreement& agreement, double size,
             bool angles_differ, HandEyeResult* result) {
@@ -559,15 +582,39 @@ bool closes(const HandEyeOptions& options, const Work& work, const Rows& rows, c
   else if (!result->unobservable.empty())
     return false;
   if (result->readings.empty() && !(open > kHopeless)) return true;
-  result->status = HandEyeStatus::not_closing;
-  result->as_given = {"", "", agreement.position, agreement.rotation, false};
-  result->message = not_closing_message(*result, options.setup);
+  if (result->readings.empty()) try_board_lengths(work, rows, agreement, size, result);
+  refuse_open_loop(options, agreement, result);
   return false;
+}
+
+/// The lens as given, beside that which fits the pixels best when every board is where they have it.
+void look_at_given_lens(const Work& work, HandEyeResult* result) {
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kLens, kLens);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(kLens);
+  double sum = 0.0, degrees_of_freedom = 0.0;
+  for (const std::size_t i : work.fitted) {
+    const BoardImage& image = work.poses.images[i];
+    const LensShare share = lens_share(*work.poses.camera, image, work.problem.B[i]);
+    gram += share.gram, gradient += share.gradient;
+    const double count = 2.0 * static_cast<double>(image.pixels.cols());
+    sum += count * std::pow(pixel_rms(*work.poses.camera, image, work.problem.B[i]), 2);
+    degrees_of_freedom += count - 6.0;
+  }
+  const Eigen::VectorXd unit = unit_scale<Eigen::Dynamic>(gram);
+  const Eigen::VectorXd scaled = unit.cwiseProduct(gradient);
+  const double gain =
+      scaled.dot(solve_symmetric<Eigen::Dynamic, 1>(unit.asDiagonal() * gram * unit.asDiagonal(), scaled));
+  const double given = sum / degrees_of_freedom, best = (sum - gain) / (degrees_of_freedom - kLens);
+  if (given > kFinest * kFinest && given > kOtherLens * best && gain > kCertainLens * kLens * best)
+    warn(result, {HandEyeConcernKind::other_lens, std::sqrt(given), std::sqrt(best)});
 }
 
 /// Pixels are what was measured, where they scatter as they say.
 void use_images(const HandEyeOptions& options, Work* work, HandEyeResult* result) {
-  if (options.refine_camera) refine_lens(options, work, result);
+  if (options.refine_camera)
+    refine_lens(options, work, result);
+  else
+    look_at_given_lens(*work, result);
   const LoopEstimate by_pixels = fit_by_pixels_noise(options, *work);
   if (scatters_beyond_pixels(*work, by_pixels)) {  // the loop's own noise stands
     const LoopNoise& noise = work->fit.noise;
@@ -595,6 +642,10 @@ void describe(const HandEyeOptions& options, const Agreement& agreement, double 
   look_at_board_scale(options, work, result);
   look_behind(work.problem.B, work.fitted, result);
   look_at_errors(options, std::max(result->working_point.norm(), size), result);
+  if (result->status == HandEyeStatus::not_observable && agreement.rotation > kScattered) {
+    result->unobservable.clear();
+    refuse_open_loop(options, agreement, result);
+  }
   if (result->status != HandEyeStatus::done) return;
   const std::string poses = std::to_string(work.fitted.size()) + " poses";
   const std::string error =

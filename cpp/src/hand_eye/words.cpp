@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "hand_eye/words.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "hand_eye/readings.hpp"
@@ -68,10 +69,13 @@ std::string unobservable_message(const std::vector<Unobservable>& all) {
 std::string not_closing_message(const HandEyeResult& result, HandEyeSetup setup) {
   const std::string given = "The loop does not close as given (median " + millimetres(result.as_given.position_rms) +
                             ", " + degrees(result.as_given.rotation_rms) + ").";
+  if (result.readings.empty() && result.board_scale != 1.0)
+    return given + " It closes with a board " + number(std::max(result.board_scale, 1.0 / result.board_scale), 3) +
+           " times as " + (result.board_scale > 1.0 ? "large" : "small") + ": check its lengths, and their unit.";
   if (result.readings.empty())
     return given +
-           " No other reading of the poses that was tried closes it: check that every board belongs to its hand pose, "
-           "and how orientations are written.";
+           " No other reading of the poses that was tried closes it: check that every board belongs to its hand pose "
+           "(where a row is missing, or there twice, all that follow are shifted), and how orientations are written.";
   const Reading& best = result.readings.front();
   const std::string closes =
       given + " It closes to " + millimetres(best.position_rms) + ", " + degrees(best.rotation_rms) + " if ";
@@ -108,6 +112,11 @@ std::string text_of(const HandEyeConcern& concern) {
              (off > 0.0 ? "larger" : "smaller") + " than given (standard error " +
              number(100.0 * concern.reference, 2) + " %): check the size of its squares.";
     }
+    case HandEyeConcernKind::other_lens:
+      return "With the camera as it was given, points of the board are off by " + number(concern.value, 2) +
+             " px in their images, and by " + number(concern.reference, 2) +
+             " px with one that fits them: is it this camera, focused as when it was calibrated? Standard errors take "
+             "it for exact: have it refined.";
     case HandEyeConcernKind::behind_camera:
       break;
   }

@@ -57,6 +57,11 @@ _MISPLACED = 6.0  # times the usual error of points, in all images and in its ow
 _LEAST_MISPLACED = 0.2  # [px]
 _MISPLACED_ROUNDS = 5  # what is far off hides what is less
 _MOST_MISPLACED = 0.2  # of the points of an image: where more are off, it is not single ones that are
+_DOT_EDGE = 24  # points on the edge of a dot
+_DOT_ROUNDS = 2  # its centre shifts by a small part of its radius, and that by a smaller one
+_FEWEST_MARKERS = 6  # to tell how large they are
+_MARKER = 0.1  # of a marker's side: less misplaces no corner
+_MARKER_EDGE = 2.0  # [px] its edges as they are found
 _MOST_PIXELS = 200_000_000
 _LARGEST_RATIO = 1e4  # of focal length and image size
 
@@ -159,7 +164,7 @@ class BoardViews:
     found: tuple[int, ...]  # numbers of these images
     missing: tuple[int, ...]  # numbers of the others
     points: tuple[Floats, ...]  # shape=(m, 3) [m] in the board's frame
-    pixels: tuple[Floats, ...]  # shape=(m, 2) [px]
+    pixels: tuple[Floats, ...]  # shape=(m, 2) [px]; of dots, where their centres are seen
     T_camera_board: Floats  # shape=(n, 4, 4), from the points of each image alone
     rms: Floats  # shape=(n,) [px] of these poses
     camera: Camera
@@ -376,7 +381,7 @@ def find_board(
         if progress is not None:
             progress(number + 1, len(images))
     search.look_again(images)
-    search.refuse_other_spacing()
+    search.refuse_other_sizes()
     board, seen = search.board, search.seen
     found = sorted(seen)
     missing = [number for number in range(len(images)) if number not in seen]
@@ -390,7 +395,10 @@ def find_board(
             f"the board in the images is larger than {board}: {larger} is found as well, and of {board}"
             f" nobody knows which part; say --board {larger}"
         )
-    return _with_poses(cv, board, images, called, found, missing, points, pixels, search.size, camera, where)
+    radius = search.dot_radius()
+    return _with_poses(
+        cv, board, images, called, found, missing, points, pixels, search.size, camera, where, radius
+    )
 
 
 class _Search:
@@ -425,9 +433,25 @@ class _Search:
             for number in self._undecided:
                 self._find(number, _grey(self._cv, images[number], self._called[number]))
 
-    def refuse_other_spacing(self) -> None:
-        """Raises InputError where tags are not as far apart as was said: then nothing else is right."""
-        spacing = self._finder.spacing_seen() if self._finder is not None else None
+    def dot_radius(self) -> float:
+        """[m] 0 where there are no dots."""
+        return self._finder.dot_radius() if self._finder is not None else 0.0
+
+    def refuse_other_sizes(self) -> None:
+        """Raises InputError where markers are of another size beside their squares than was said, or tags not
+        as far apart: then nothing else is right.
+        """
+        if self._finder is None:
+            return
+        marker = self._finder.marker_seen()
+        if marker is not None:
+            board = self.board
+            raise InputError(
+                f"--board {board}: markers in the images have {marker / board.size:.3g} times the side of"
+                f" their squares ({marker * 1e3:.3g} mm of {board.size * 1e3:.4g} mm), and what was said is"
+                f" {board.marker / board.size:.3g} times: measure both on the board"
+            )
+        spacing = self._finder.spacing_seen()
         if spacing is None:
             return
         said, side = self.board.spacing, self.board.size * 1e3
@@ -459,7 +483,7 @@ def _grey(cv: Any, image: Path | str | Image, name: str) -> Image:
         try:
             require_whole_file(Path(image))
             data = np.frombuffer(Path(image).read_bytes(), dtype=np.uint8)
-            grey = cv.imdecode(data, cv.IMREAD_GRAYSCALE) if data.size else None
+            grey = cv.imdecode(data, cv.IMREAD_GRAYSCALE | cv.IMREAD_ANYDEPTH) if data.size else None
         except OSError as error:
             raise InputError(f"{name}: cannot be read: {error.strerror}") from None
         except cv.error:
@@ -472,14 +496,23 @@ def _grey(cv: Any, image: Path | str | Image, name: str) -> Image:
         grey = np.asarray(image)
         if grey.ndim == 3:
             grey = cv.cvtColor(grey, cv.COLOR_BGR2GRAY)
-        if grey.dtype != np.uint8 or grey.ndim != 2:
-            raise InputError(
-                f"{name}: found an array of {grey.dtype}, shape {grey.shape}, expected grey values of 8 bits,"
-                " shape (height, width)"
-            )
+    grey = _eight_bits(grey)
+    if grey.dtype != np.uint8 or grey.ndim != 2:
+        raise InputError(
+            f"{name}: found pixels of {grey.dtype}, shape {grey.shape}, expected grey values of 8 or 16 bits,"
+            " shape (height, width)"
+        )
     if min(grey.shape) < 32:
         raise InputError(f"{name}: has {grey.shape[1]} x {grey.shape[0]} pixels only")
     return np.ascontiguousarray(grey)
+
+
+def _eight_bits(grey: NDArray[Any]) -> NDArray[Any]:
+    """Of pixels of 16 bits the highest eight that are used: cameras write their 10 or 12 bits so."""
+    if grey.dtype != np.uint16:
+        return grey
+    spare = max(0, int(grey.max()).bit_length() - 8)
+    return (grey >> spare).astype(np.uint8)
 
 
 def _check_size(camera: Camera | None, size: tuple[int, int], name: str, where: str) -> None:
@@ -510,6 +543,8 @@ class _Finder:
         self._points = board.points
         self._detector: Any = _charuco_detector(cv, board) if board.kind == "charuco" else None
         self._tags = TagFinder(cv, board.tags) if board.kind == "apriltag" else None
+        self._radii: list[float] = []  # [m] of dots, of images
+        self._markers: list[tuple[float, float]] = []  # of images, sides of ArUco markers: [m], [px]
 
     def __call__(self, grey: Image) -> tuple[Floats, Floats] | None:
         try:
@@ -525,6 +560,14 @@ class _Finder:
     def spacing_seen(self) -> float | None:
         """Of a grid of tags, where it is another one than was said: gap between two over their side."""
         return None if self._tags is None else self._tags.spacing_seen()
+
+    def marker_seen(self) -> float | None:
+        """Of a ChArUco board, where it is another one than was said: side of a marker [m]."""
+        if not self._markers:
+            return None
+        side, pixels = np.median(self._markers, axis=0)
+        allowed = _MARKER + _MARKER_EDGE / pixels
+        return float(side) if abs(side / self.board.marker - 1.0) > allowed else None
 
     # -- chessboard
 
@@ -589,14 +632,31 @@ class _Finder:
                 image, shape, flags=flags | extra, blobDetector=self._blobs(grey, effort)
             )
             if found:
-                pixels = _dot_centres(cv, image, np.asarray(centres, dtype=np.float64).reshape(-1, 2))
+                pixels, area = _dot_middles(cv, image, np.asarray(centres, dtype=np.float64).reshape(-1, 2))
                 grid = pixels.reshape(self.board.rows, self.board.columns, 2)
-                return (
+                ordered = (
                     _right_handed(grid).reshape(-1, 2)
                     if self.board.kind == "circles"
                     else self._asymmetric(grid)
                 )
+                if ordered is not None:
+                    self._measure_dots(ordered, area)
+                return ordered
         return None
+
+    def _measure_dots(self, pixels: Floats, area: float) -> None:
+        """Their radius, from the area [px^2] of the usual one; a homography H scales areas by det H / w^3."""
+        H, _ = self.cv.findHomography(self._points[:, :2], pixels)
+        if H is None or not math.isfinite(area):
+            return
+        w = np.column_stack([self._points[:, :2], np.ones(len(pixels))]) @ np.asarray(H)[2]
+        scale = float(np.median(np.linalg.det(H) / w**3))
+        if scale > 0:
+            self._radii.append(math.sqrt(area / scale / math.pi))
+
+    def dot_radius(self) -> float:
+        """[m] of dots as they are seen; 0: it is no board of dots, or they were not measured."""
+        return float(np.median(self._radii)) if self._radii else 0.0
 
     def _asymmetric(self, grid: Floats) -> Floats | None:
         """Of the orders in which the rows may have been counted, the one that a plane shows so."""
@@ -626,7 +686,9 @@ class _Finder:
     # -- ChArUco
 
     def _charuco(self, grey: Image) -> tuple[Floats, Floats] | None:
-        corners, identities, _, _ = self._detector.detectBoard(grey)
+        corners, identities, markers, numbers = self._detector.detectBoard(grey)
+        if numbers is not None:
+            self._measure_markers(np.asarray(markers, dtype=np.float64), np.asarray(numbers).ravel())
         if identities is None or len(identities) < _FEWEST_POINTS:
             return None
         order = np.asarray(identities).ravel()
@@ -645,6 +707,21 @@ class _Finder:
             return None
         good = np.asarray(inside).ravel() > 0
         return (points[good], pixels[good]) if good.sum() >= max(_FEWEST_POINTS, 0.7 * len(good)) else None
+
+    def _measure_markers(self, markers: Floats, numbers: NDArray[np.intp]) -> None:
+        """Sides of the markers in an image. Their middles are where they are whatever their size is."""
+        on_board = np.asarray(self._detector.getBoard().getObjPoints(), dtype=np.float64)[:, :, :2]
+        markers = markers.reshape(-1, 4, 2)[numbers < len(on_board)]
+        numbers = numbers[numbers < len(on_board)]
+        if len(numbers) < _FEWEST_MARKERS:
+            return
+        middles = on_board[numbers].mean(axis=1)
+        H, _ = self.cv.findHomography(markers.mean(axis=1), middles, self.cv.RANSAC, 0.1 * self.board.size)
+        if H is None:
+            return
+        flat = self.cv.perspectiveTransform(markers.reshape(-1, 1, 2), H).reshape(-1, 4, 2)
+        sides = [np.linalg.norm(one - np.roll(one, 1, axis=1), axis=2) for one in (flat, markers)]
+        self._markers.append((float(np.median(sides[0])), float(np.median(sides[1]))))
 
 
 def _charuco_detector(cv: Any, board: Board) -> Any:
@@ -695,19 +772,38 @@ def _dictionary(cv: Any, grey: Image, markers: int) -> str:
     """The dictionary that most markers in an image are of, in the smallest size that has so many markers;
     empty: there are none.
     """
-    most, best = 1, ""
+    return _smallest(_markers_in(cv, grey)[0], markers)
+
+
+def _smallest(family: str, markers: int) -> str:
+    """The dictionary of a family: a smaller size begins with the same markers."""
+    if family not in _FAMILIES:
+        return family
+    return f"{family}_{next((size for size in _FAMILY_SIZES if size >= markers), _FAMILY_SIZES[-1])}"
+
+
+def _markers_in_all(cv: Any, images: Sequence[Image]) -> tuple[str, int]:
+    """The family of markers in images, and how many they are by the highest number; empty: there are none."""
+    families, numbers = zip(*(_markers_in(cv, grey) for grey in images), strict=True) if images else ((), ())
+    family = max(families, key=families.count, default="")
+    alike = [seen for name, seen in zip(families, numbers, strict=True) if name == family and seen]
+    return (family, max(map(max, alike)) + 1) if alike else ("", 0)
+
+
+def _markers_in(cv: Any, grey: Image) -> tuple[str, list[int]]:
+    """The family that most markers in an image are of, and their numbers; empty: there are none."""
+    best: tuple[str, list[int]] = ("", [])
+    if not hasattr(cv, "aruco"):
+        return best
     for name in [f"{family}_{_FAMILY_SIZES[-1]}" for family in _FAMILIES] + list(_OTHER_DICTIONARIES):
         if not hasattr(cv.aruco, f"DICT_{name}"):
             continue
         _, identities, _ = cv.aruco.ArucoDetector(
             cv.aruco.getPredefinedDictionary(getattr(cv.aruco, f"DICT_{name}"))
         ).detectMarkers(grey)
-        count = 0 if identities is None else len(np.unique(identities))
-        if count > most:
-            most, best = count, name
-    family = best.rpartition("_")[0]
-    if family in _FAMILIES:  # a smaller size begins with the same markers
-        best = f"{family}_{next((size for size in _FAMILY_SIZES if size >= markers), _FAMILY_SIZES[-1])}"
+        numbers = [] if identities is None else np.unique(identities).tolist()
+        if len(numbers) > max(1, len(best[1])):
+            best = (name.removesuffix(f"_{_FAMILY_SIZES[-1]}"), numbers)
     return best
 
 
@@ -731,11 +827,13 @@ def _first_square_is_dark(grey: Image, grid: Floats) -> bool:
     return bool(values[alike].mean() < values[~alike].mean())
 
 
-def _dot_centres(cv: Any, grey: Image, centres: Floats) -> Floats:
-    """Centres of gravity of the dots: dark grey values around each, weighed by how dark they are."""
+def _dot_middles(cv: Any, grey: Image, centres: Floats) -> tuple[Floats, float]:
+    """Centres of gravity of the dots: dark grey values around each, weighed by how dark they are. And the
+    area of the usual dot [px^2], NaN where none could be weighed.
+    """
     nearest = np.linalg.norm(centres[:, None] - centres[None], axis=2)
     np.fill_diagonal(nearest, np.inf)
-    out = centres.copy()
+    out, areas = centres.copy(), []
     for k, (x, y) in enumerate(centres):
         half = int(np.clip(0.6 * nearest[k].min(), 3, 200))
         left, top = max(0, round(x) - half), max(0, round(y) - half)
@@ -763,7 +861,8 @@ def _dot_centres(cv: Any, grey: Image, centres: Floats) -> Floats:
         if total > 0:
             yy, xx = np.mgrid[0 : window.shape[0], 0 : window.shape[1]]
             out[k] = left + (weight * xx).sum() / total, top + (weight * yy).sum() / total
-    return out
+            areas.append(total / (level - dark))
+    return out, float(np.median(areas)) if areas else math.nan
 
 
 # ---- Another board than was said -----------------------------------------------------------------
@@ -846,30 +945,8 @@ def _refuse_too_few(
         for number in missing[:: max(1, len(missing) // _TRIED)][:_TRIED]
     ]
     if board.kind == "apriltag":
-        raise InputError(f"{head}; {_tags_in_sight(cv, tried, board)}")
-    best, most = None, (0, -math.inf)
-    # Of a grid of dots, and of numbered corners, a smaller one is found as well: most points win.
-    markers = "" if not hasattr(cv, "aruco") else _dictionary(cv, tried[0], 0) if tried else ""
-    for other in _neighbours(board):
-        if other.kind == "charuco":
-            if not markers:
-                continue
-            family = markers.rpartition("_")[0]
-            count = other.columns * other.rows // 2
-            other = replace(
-                other,
-                dictionary=(
-                    f"{family}_{next((s for s in _FAMILY_SIZES if s >= count), _FAMILY_SIZES[-1])}"
-                    if family in _FAMILIES
-                    else markers
-                ),
-            )
-        this = _hits(cv, tried, other)
-        if this > most:
-            best, most = other, this
-        if other.kind == "charuco" and most[1] >= 0.85 * len(tried) * len(other.points):
-            break  # a row more would find its corners at this board's edge
-    hits = most[0]
+        raise InputError(f"{head}; {_aruco_in_sight(cv, tried)}{_tags_in_sight(cv, tried, board)}")
+    best, hits, family = _board_in_sight(cv, tried, board)
     if best is not None and hits >= 0.5 * len(tried):
         counting = ""
         if board.kind == best.kind == "chessboard" and (
@@ -881,6 +958,8 @@ def _refuse_too_few(
                 if best.columns < board.columns
                 else ": these are one more each way than was said"
             )
+        if best.kind == "charuco" and board.dictionary and not board.dictionary.startswith(family):
+            counting = f": its markers are of {family}, not of {board.dictionary}"
         named = f"{best.kind}:{best.columns}x{best.rows}"
         best = replace(best, dictionary="", legacy=None)
         say = f"--board {best}" if best.kind == board.kind else f"--board {named}:… with its size"
@@ -888,6 +967,8 @@ def _refuse_too_few(
             f"{head}; but {named} is in {hits} of the {len(tried)} that were looked at again{counting}. Say"
             f" {say}"
         )
+    if board.kind == "charuco" and _hits(cv, [grey[:, ::-1].copy() for grey in tried], board)[0]:
+        raise InputError(f"{head}; but it is there in mirrored images: give them as the camera took them")
     margin = {
         "chessboard": "its white margin",
         "charuco": "its markers",
@@ -898,6 +979,32 @@ def _refuse_too_few(
         f"{head}; not found in {which}. Boards of neighbouring counts are not there either: does every image"
         f" show the whole board, sharp and evenly lit, with {margin}? Expected {_EXPECTED}"
     )
+
+
+def _board_in_sight(cv: Any, tried: Sequence[Image], board: Board) -> tuple[Board | None, int, str]:
+    """The board that images seem to show instead, in how many of them, and the family of their markers."""
+    best, most = None, (0, -math.inf)
+    # Of a grid of dots, and of numbered corners, a smaller one is found as well: most points win.
+    family, markers = _markers_in_all(cv, tried)
+    others = [other for other in _neighbours(board) if other.kind != "charuco" or markers]
+    others.sort(key=lambda other: other.kind == "charuco" and other.columns * other.rows // 2 != markers)
+    for other in others:
+        if other.kind == "charuco":
+            other = replace(other, dictionary=_smallest(family, other.columns * other.rows // 2))
+        this = _hits(cv, tried, other)
+        if this > most:
+            best, most = other, this
+        if other.kind == "charuco" and most[1] >= 0.85 * len(tried) * len(other.points):
+            break  # a row more would find its corners at this board's edge
+    return best, most[0], family
+
+
+def _aruco_in_sight(cv: Any, images: Sequence[Image]) -> str:
+    """A hint at a ChArUco board where another one was named."""
+    family, markers = _markers_in_all(cv, images)
+    if family not in _FAMILIES:
+        return ""
+    return f"ArUco markers of {family} are there, numbers up to {markers - 1} (is it a ChArUco board?); "
 
 
 def _tags_in_sight(cv: Any, images: Sequence[Image], board: Board) -> str:
@@ -1013,6 +1120,24 @@ def _well_placed(
     ]
 
 
+def _beside_centres(cv: Any, points: Floats, frame: Floats, camera: Camera, radius: float) -> Floats:
+    """By how much the middle of each dot's picture lies beside the picture of its centre [px]: a dot's nearer
+    half is larger (Heikkila 2000, "Geometric camera calibration using circular control points", section 2).
+    """
+    matrix, distortion = _matrix(camera)
+    turn, shift = cv.Rodrigues(frame[:3, :3])[0], frame[:3, 3]
+    angle = np.linspace(0.0, 2.0 * math.pi, _DOT_EDGE, endpoint=False)
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    both = np.concatenate([points[:, None], points[:, None] + ring], axis=1)  # centre, then edge
+    pictures, _ = cv.projectPoints(both.reshape(-1, 3), turn, shift, matrix, distortion)
+    pictures = np.asarray(pictures).reshape(len(points), -1, 2)
+    edge = pictures[:, 1:] - pictures[:, :1]
+    following = np.roll(edge, -1, axis=1)
+    twice = edge[..., 0] * following[..., 1] - edge[..., 1] * following[..., 0]  # areas of triangles
+    moments = ((edge + following) * twice[..., None]).sum(axis=1)
+    return np.asarray(moments / (3.0 * twice.sum(axis=1)[:, None]))
+
+
 def _chosen(values: Sequence[Floats], masks: Sequence[NDArray[np.bool_]]) -> list[Floats]:
     return [one[mask] for one, mask in zip(values, masks, strict=True)]
 
@@ -1108,6 +1233,7 @@ def _with_poses(
     size: tuple[int, int],
     camera: Camera | None,
     where: str,
+    dot_radius: float,
 ) -> BoardViews:
     given = camera is not None
     calibration_rms = math.nan
@@ -1122,6 +1248,15 @@ def _with_poses(
         if all(mask.all() for mask in right):
             break
         points, pixels = _chosen(points, right), _chosen(pixels, right)
+        if not given:
+            camera, calibration_rms = _calibrated(cv, points, pixels, size)
+        frames, errors = _poses(cv, points, pixels, camera)
+    middles = pixels
+    for _ in range(_DOT_ROUNDS if dot_radius > 0 else 0):
+        pixels = [
+            seen - _beside_centres(cv, p, frame, camera, dot_radius)
+            for p, seen, frame in zip(points, middles, frames, strict=True)
+        ]
         if not given:
             camera, calibration_rms = _calibrated(cv, points, pixels, size)
         frames, errors = _poses(cv, points, pixels, camera)
@@ -1176,7 +1311,7 @@ def _bad_fit(
         _grey(cv, images[number], called[number])
         for number in found[:: max(1, len(found) // _TRIED)][:_TRIED]
     ]
-    for other in _neighbours(board):
+    for other in sorted(_neighbours(board), key=lambda other: other.kind != "charuco"):
         if _hits(cv, tried, other)[0] == len(tried):
             return (
                 f"the points found are not those of {board}: no camera sees them so, {rms:.3g} px rms are"

@@ -11,7 +11,7 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Literal
@@ -46,6 +46,8 @@ _SETS = ("train", "test")
 _FEWEST = 3  # poses
 _FARTHEST = 100.0  # [m] no robot's hand and no camera's board spread over more
 _EQUAL = 1e-9  # [m | rad] poses that differ by less are one
+_STILL = 5e-5  # [m | rad] a hand that moved by less stood still: its error is the same
+_STILL_BOARD = 0.02  # [rad, and of its distance] and so did the board that a camera sees no further away
 
 # Orders of turned (intrinsic) axes: the letters from left to right are the rotations as they are multiplied.
 EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
@@ -442,7 +444,8 @@ def load_handeye(
     hand_qz, the flange in the robot base as the controller reports it; then board_x_m … board_qz, the board
     in the camera, or `image`, a path relative to the file. Instead of a quaternion hand_rx_deg hand_ry_deg
     hand_rz_deg (or _rad; board likewise). Optional: t_s, board_t_s, set (train, test), q1_rad … (for
-    `handeye_with_kinematics`). Rows whose board cells are all empty are left out, with a warning.
+    `handeye_with_kinematics`). Rows whose board cells are all empty are left out, and rows of one pose,
+    robot and board as in an earlier row, count as one, with a warning.
 
     board: what is in the images, "chessboard:9x6:25mm" (inner corners), "charuco:5x7:40mm:30mm",
     "circles:10x10:25.4mm", "acircles:4x11:20mm", "apriltag:36h11:6x6:88mm:0.3";
@@ -479,9 +482,8 @@ def load_handeye(
         if use_images and parsed is not None
         else _seen_in_file(table, reader, board_kind)
     )
+    seen = _checked(table, hand, seen, sets, streams=board_time is not None)
     rows, views = seen.rows, seen.views
-    _check_count(table, len(rows), "with a board")
-    _check_poses(table.path, hand[rows], seen.T_camera_board, images=views is not None, columns=True)
     poses = _core.HandEyePoses(
         hand[rows],
         seen.T_camera_board,
@@ -504,6 +506,16 @@ def load_handeye(
         unused=tuple(seen.unused),
         convention=(angles or "") if "angles" in (kind, board_kind) else "quaternion",
     )
+
+
+def _checked(
+    table: Table, hand: Floats, seen: _Seen, sets: NDArray[np.int8] | None, *, streams: bool
+) -> _Seen:
+    """Poses enough, that poses may be; those of a robot that stood still are one, but not in a stream."""
+    _check_count(table, len(seen.rows), "with a board")
+    images = seen.views is not None
+    _check_poses(table.path, hand[seen.rows], seen.T_camera_board, images=images, columns=True)
+    return seen if streams else _one_of_each_pose(table.path, hand, seen, sets)
 
 
 def _require_a_board(table: Table, plan: _Plan, board: Board | None, use_images: bool) -> None:
@@ -590,6 +602,89 @@ def _seen_in_file(table: Table, reader: _Reader, kind: str) -> _Seen:
     return _Seen(rows, seen[rows], [f"row {row} (from 0) has no board pose" for row in absent])
 
 
+def _one_of_each_pose(path: Path, hand: Floats, seen: _Seen, sets: NDArray[np.int8] | None = None) -> _Seen:
+    """Rows at which the robot stands as in an earlier one, and the board as well, become one with it. The
+    robot's error is the same in them: as poses of their own they would be counted as if it were not.
+    """
+    first = _first_alike(hand[seen.rows], seen.T_camera_board, None if sets is None else sets[seen.rows])
+    kept = np.unique(first)
+    if len(kept) == len(first):
+        return seen
+    groups = [np.flatnonzero(first == k) for k in kept]
+    repeats = [
+        (int(seen.rows[k]), int(seen.rows[first[k]])) for k in np.flatnonzero(first != np.arange(len(first)))
+    ]
+    named = [f"{row} (as {earlier})" for row, earlier in repeats]
+    warnings.warn(
+        InputWarning(
+            f"{path}: {len(repeats)} of {len(first)} poses are those of an earlier row, robot and board:"
+            f" they count as one with it, as the robot's error is the same: {listed(named, 12)} (rows from 0)"
+        ),
+        stacklevel=3,
+    )
+    _require_enough(path, len(kept), "that differ")
+    return _Seen(
+        seen.rows[kept],
+        np.array([_mean_frame(seen.T_camera_board[group]) for group in groups]),
+        [*seen.unused, *(f"row {row} (from 0) has the pose of row {earlier}" for row, earlier in repeats)],
+        seen.images,
+        None if seen.views is None else _views_together(seen.views, groups),
+    )
+
+
+def _first_alike(hand: Floats, board: Floats, sets: NDArray[np.int8] | None) -> NDArray[np.intp]:
+    """Of each pose the first at which hand and board stood alike, itself if there is none."""
+    first = np.arange(len(hand))
+    far = np.linalg.norm(board[:, :3, 3], axis=1)
+    for k in range(1, len(hand)):
+        alike = (_apart(hand[:k], hand[k]) < _STILL).all(axis=1)
+        alike &= (_apart(board[:k], board[k]) < _STILL_BOARD * np.array([far[k], 1.0])).all(axis=1)
+        alike &= first[:k] == np.arange(k)
+        if sets is not None:
+            alike &= sets[:k] == sets[k]
+        if alike.any():
+            first[k] = int(np.argmax(alike))
+    return first
+
+
+def _apart(frames: Floats, frame: Floats) -> Floats:
+    """shape=(n, 2) [m] and, while it is small, [rad]."""
+    turn = np.linalg.norm(frames[:, :3, :3] - frame[:3, :3], axis=(1, 2)) / math.sqrt(2.0)
+    return np.column_stack([np.linalg.norm(frames[:, :3, 3] - frame[:3, 3], axis=1), turn])
+
+
+def _mean_frame(frames: Floats) -> Floats:
+    """Of frames that are nearly alike; the one itself where it is alone."""
+    if len(frames) == 1:
+        return np.asarray(frames[0])
+    mean = frames.mean(axis=0)
+    u, _, vt = np.linalg.svd(mean[:3, :3])
+    mean[:3, :3] = u @ vt
+    return np.asarray(mean)
+
+
+def _views_together(views: BoardViews, groups: Sequence[NDArray[np.intp]]) -> BoardViews:
+    """Images of one pose as one, with the points of all; a copy of an image tells nothing new."""
+    points, pixels = [], []
+    for group in groups:
+        own = [
+            k
+            for k in group
+            if not any(np.array_equal(views.pixels[k], views.pixels[j]) for j in group if j < k)
+        ]
+        points.append(np.vstack([views.points[k] for k in own]))
+        pixels.append(np.vstack([views.pixels[k] for k in own]))
+    kept = [int(group[0]) for group in groups]
+    return replace(
+        views,
+        found=tuple(views.found[k] for k in kept),
+        points=tuple(points),
+        pixels=tuple(pixels),
+        T_camera_board=views.T_camera_board[kept],
+        rms=views.rms[kept],
+    )
+
+
 def load_stream(path: PathLike, side: Side, *, angles: str | None = None) -> Stream:
     """Read poses with times: t_s and hand_x_m … hand_qz, or board_x_m … board_qz. Columns as in
     `load_handeye`; times increase. Or poses as other programs write them: lines of 16 or 12 numbers and
@@ -630,9 +725,14 @@ def pair_rows(hand: Stream, board: Stream) -> HandEyeData:
             f"{board.path}: has {len(board.T)} poses, expected {len(hand.T)} as in {hand.path}: without times"
             " they belong together row by row"
         )
-    _check_poses(hand.path, hand.T, board.T)
-    poses = _core.HandEyePoses(hand.T, board.T)
-    return HandEyeData(hand.path, poses, np.arange(len(hand.T)), convention="matrices")
+    return _of_matrices(hand.path, hand.T, board.T, "matrices")
+
+
+def _of_matrices(path: Path, hand: Floats, board: Floats, convention: str) -> HandEyeData:
+    _check_poses(path, hand, board)
+    seen = _one_of_each_pose(path, hand, _Seen(np.arange(len(hand)), board, []))
+    poses = _core.HandEyePoses(hand[seen.rows], seen.T_camera_board)
+    return HandEyeData(path, poses, seen.rows, unused=tuple(seen.unused), convention=convention)
 
 
 def _of_other_program(other: OtherPoses, board: str | Board | None) -> HandEyeData:
@@ -650,9 +750,7 @@ def _of_other_program(other: OtherPoses, board: str | Board | None) -> HandEyeDa
     if len(hand) != len(seen):
         raise InputError(f"{other.path}: has {len(hand)} poses of the hand, but {len(seen)} of the board")
     _require_enough(other.path, len(hand))
-    _check_poses(other.path, hand, seen)
-    poses = _core.HandEyePoses(hand, seen)
-    return HandEyeData(other.path, poses, np.arange(len(hand)), convention=other.tool)
+    return _of_matrices(other.path, hand, seen, other.tool)
 
 
 def _stream_of_other_program(other: OtherPoses, side: Side) -> Stream:

@@ -769,6 +769,31 @@ TEST_CASE("poses that belong to nothing are refused without a reading") {
   CHECK(r.readings.empty());
 }
 
+TEST_CASE("boards ten times too large or too small do not close, and the factor is said") {
+  for (const HandEyeSetup setup : kSetups)
+    for (const double factor : {0.1, 10.0}) {
+      Scene s = make_scene(setup, 15, kUsual, 63);
+      for (Eigen::Isometry3d& T : s.poses.T_camera_board) T.translation() *= factor;
+      const HandEyeResult r = handeye(s.poses, options_for(s));
+      REQUIRE(r.status == HandEyeStatus::not_closing);
+      CHECK(r.board_scale * factor == doctest::Approx(1.0).scale(0).epsilon(0.01));
+      CHECK(r.message.find(factor > 1.0 ? " times as small" : " times as large") != std::string::npos);
+    }
+}
+
+TEST_CASE("a row that is there twice shifts those that follow, and motions are not blamed for it") {
+  for (const std::ptrdiff_t row : {4, 8, 12}) {
+    Scene s = make_scene(HandEyeSetup::eye_in_hand, 16, kUsual, 64);
+    Frames& hands = s.poses.T_base_hand;
+    hands.insert(hands.begin() + row, hands[static_cast<std::size_t>(row)]), hands.pop_back();
+    const HandEyeResult r = handeye(s.poses, options_for(s));
+    if (r.status == HandEyeStatus::done)
+      CHECK_FALSE(r.rejected.empty());
+    else
+      CHECK(r.status == HandEyeStatus::not_closing);
+  }
+}
+
 TEST_CASE("a board of another size is said") {
   Scene s = make_scene(HandEyeSetup::eye_in_hand, 30, kUsual, 71);
   for (Eigen::Isometry3d& T : s.poses.T_camera_board) T.translation() *= 0.96;
@@ -936,6 +961,20 @@ TEST_CASE("standard errors from images are the scatter over 60 seeds") {
     for (int k = 0; k < 3; ++k, ++count) inside += std::abs(e(k)) < 1.96 * std::sqrt(r.working_point_covariance(k, k));
   }
   if (!kSanitized) CHECK(inside > 0.88 * count);
+}
+
+TEST_CASE("a lens that is not that of the images is said, and one that is theirs is not doubted") {
+  for (const double off : {0.0, 10.0})
+    for (std::uint64_t seed = 1; seed <= (kSanitized ? 1 : 10); ++seed) {
+      Scene s = make_pixel_scene(15, 1e-4, 0.05 * kDegree, 0.1, seed, kCamera);
+      s.poses.camera->cx += 5.0 * off, s.poses.camera->distortion[0] += 0.01 * off;
+      const HandEyeResult r = handeye(s.poses, options_for(s));
+      REQUIRE(r.status == HandEyeStatus::done);
+      const bool said = std::any_of(r.concerns.begin(), r.concerns.end(), [](const HandEyeConcern& concern) {
+        return concern.kind == HandEyeConcernKind::other_lens;
+      });
+      CHECK(said == (off > 0.0));
+    }
 }
 
 TEST_CASE("what is about board poses is refused, and not proposed, where boards were found in images") {

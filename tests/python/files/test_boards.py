@@ -158,6 +158,34 @@ def test_pixels_are_those_of_the_points_to_a_tenth_and_count_from_the_pixel_cent
         assert np.sqrt(np.mean(np.sum(every**2, axis=1))) < 0.2
 
 
+@pytest.mark.parametrize("text", ["circles:6x6:25mm", "acircles:4x11:20mm"])
+def test_of_dots_seen_aslant_the_centre_is_found_not_the_middle_of_the_picture(text: str) -> None:
+    board = parse_board(text)
+    poses = board_poses(board, 6, seed=1)
+    views = find_board([render(board, T, seed=k) for k, T in enumerate(poses)], board)
+    turned = [[T @ S for S in (np.eye(4), *board.symmetries())] for T in poses]
+    off_centre = []
+    for points, pixels, frames in zip(views.points, views.pixels, turned, strict=True):
+        seen = [truing.hand_eye.project(CAMERA, points @ T[:3, :3].T + T[:3, 3]) - pixels for T in frames]
+        off_centre.append(min(np.linalg.norm(one.mean(axis=0)) for one in seen))
+    assert np.sqrt(np.mean(np.square(off_centre))) < 0.01  # the middles are 0.04 px beside the centres
+
+
+def test_deep_pixels_are_read_by_the_bits_that_are_used(tmp_path: Path) -> None:
+    board = parse_board("charuco:5x7:40mm:30mm:5X5_50")
+    images = [render(board, T, seed=k) for k, T in enumerate(board_poses(board, 3, seed=2))]
+    shallow = find_board(images, board, camera=CAMERA)
+    for bits in (10, 12, 16):
+        paths = [tmp_path / f"{bits}_{k}.png" for k in range(3)]
+        for path, image in zip(paths, images, strict=True):
+            cv2.imwrite(str(path), image.astype(np.uint16) << (bits - 8))
+        deep = find_board(paths, board, camera=CAMERA)
+        assert all(np.array_equal(a, b) for a, b in zip(deep.pixels, shallow.pixels, strict=True))
+    cv2.imwrite(str(tmp_path / "float.tiff"), images[0].astype(np.float32))
+    with pytest.raises(InputError, match="8 or 16 bits|no image that OpenCV can read"):
+        find_board([tmp_path / "float.tiff"] * 3, board, camera=CAMERA)
+
+
 def test_a_board_without_symmetry_is_never_read_turned() -> None:
     """The first square is dark: what OpenCV returns from the other end is put right."""
     board = parse_board("chessboard:8x5:25mm")
@@ -280,7 +308,18 @@ def test_images_without_the_board_are_listed(tmp_path: Path) -> None:
             "larger than circles:6x5:25mm: circles:6x6:25mm is found as well",
         ),
         ("circles:8x5:25mm", "chessboard:8x5:25mm", "circles:8x5 is in 3"),
-        ("charuco:5x7:40mm:30mm:5X5_50", "charuco:5x7:40mm:30mm:4X4_50", "charuco:5x7 is in [23]"),
+        (
+            "charuco:5x7:40mm:30mm:5X5_50",
+            "charuco:5x7:40mm:30mm:4X4_50",
+            "charuco:5x7 is in [23].*: its markers are of 5X5, not of 4X4_50. Say",
+        ),
+        ("charuco:7x5:40mm:30mm:5X5_50", "charuco:8x5:40mm:30mm", "charuco:7x5 is in [23]"),
+        (
+            "charuco:5x7:40mm:30mm:5X5_50",
+            "charuco:5x7:40mm:20mm",
+            "0.7[0-9]* times the side of their squares",
+        ),
+        ("charuco:5x7:40mm:30mm:5X5_50", "apriltag:36h11:3x3:30mm:0.3", "is it a ChArUco board"),
     ],
 )
 def test_another_board_than_was_said_is_recognised(printed: str, said: str, message: str | None) -> None:
@@ -360,7 +399,7 @@ def test_files_that_are_no_images_are_named(tmp_path: Path) -> None:
             find_board([tmp_path / name], "chessboard:9x6:25mm")
     with pytest.raises(InputError, match=r"c\.png: cannot be read: No such file"):
         find_board([tmp_path / "c.png"], "chessboard:9x6:25mm")
-    with pytest.raises(InputError, match="expected grey values of 8 bits"):
+    with pytest.raises(InputError, match="expected grey values of 8 or 16 bits"):
         find_board([np.zeros((200, 200))], "chessboard:9x6:25mm")  # type: ignore[list-item]
 
 

@@ -166,6 +166,36 @@ def test_images_are_read_with_their_board(tmp_path: Path) -> None:
     )
 
 
+def test_poses_of_a_robot_that_stood_still_count_once(tmp_path: Path) -> None:
+    order = [0, 1, 2, 3, 4, 5, 1, 1, 4]
+    hand, board = SCENE.A[order], SCENE.B[order].copy()
+    hand[6, :3, 3] += 1e-5
+    board[6, :3, 3] += 3e-4
+    columns = {**columns_of("hand", hand), **columns_of("board", board)}
+    with pytest.warns(InputWarning, match=r"3 of 9 poses .* 6 \(as 1\), 7 \(as 1\), 8 \(as 4\)"):
+        data = load_handeye(write_csv(tmp_path / "poses.csv", columns))
+    assert data.rows.tolist() == [0, 1, 2, 3, 4, 5] and len(data.unused) == 3
+    assert np.allclose(data.poses.T_camera_board[1, :3, 3], SCENE.B[1, :3, 3] + 1e-4)
+    columns["set"] = ["train"] * 6 + ["test"] * 3  # held-out poses are predicted, not fitted
+    with pytest.warns(InputWarning, match=r"1 of 9 poses"):
+        assert load_handeye(write_csv(tmp_path / "poses.csv", columns)).count == 8
+    columns = {**columns_of("hand", hand), **columns_of("board", SCENE.B[[0, 1, 2, 3, 4, 5, 2, 3, 5]])}
+    assert load_handeye(write_csv(tmp_path / "poses.csv", columns)).count == 9  # boards differ: a mistake
+
+
+def test_images_of_a_robot_that_stood_still_count_once(tmp_path: Path) -> None:
+    pytest.importorskip("cv2")
+    board = truing.files.parse_board("circles:8x5:25mm")
+    names = write_images(tmp_path, board, board_poses(board, 4))
+    copy = tmp_path / "copy.png"
+    copy.write_bytes((tmp_path / names[2]).read_bytes())
+    columns = {**columns_of("hand", SCENE.A[[0, 1, 2, 3, 2]]), "image": [*names, copy.name]}
+    with pytest.warns(InputWarning, match=r"1 of 5 poses .* 4 \(as 2\)"):
+        data = load_handeye(write_csv(tmp_path / "poses.csv", columns), board=board, camera=CAMERA)
+    assert data.images == tuple(names) and data.views is not None and data.poses.images is not None
+    assert [len(points) for points in data.views.points] == [40] * 4  # a copy tells nothing new
+
+
 # ---- What is wrong is named ----------------------------------------------------------------------
 
 
