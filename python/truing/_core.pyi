@@ -3532,7 +3532,7 @@ class HandEyeConcern:
     def __repr__(self) -> str:
         ...
     @property
-    def kind(self) -> typing.Literal['not_like_noise', 'beyond_pixels', 'noise_of_one_side', 'noise_too_small', 'board_scale', 'behind_camera']:
+    def kind(self) -> typing.Literal['not_like_noise', 'beyond_pixels', 'noise_of_one_side', 'noise_too_small', 'board_scale', 'other_lens', 'behind_camera']:
         """
         What it is.
         
@@ -3541,6 +3541,7 @@ class HandEyeConcern:
         'noise_of_one_side': position noise was given of hand or board alone: it was not used
         'noise_too_small': poses scatter by `value` times the noise that was given
         'board_scale': the loop closes best with lengths of board poses times `value`, standard error `reference`
+        'other_lens': pixels scatter by `value` [px] with the lens as given, by `reference` with one that fits them
         'behind_camera': `value` of `reference` boards are not in front of the camera
         """
     @property
@@ -3732,7 +3733,8 @@ class HandEyeResult:
     @property
     def board_scale(self) -> float:
         """
-        Factor on the board's lengths that would fit best; 1: as given.
+        Factor on the board's lengths that would fit best; 1: as given. With status `not closing` the loop
+        closes with it.
         """
     @property
     def board_scale_sigma(self) -> float:
