@@ -54,16 +54,20 @@ class NoiseEstimate {
     if (!(o.noise_time > 0.0)) return;
     const double dt = t - t_;
     seconds_ = dt > 0.0 && dt < kLongest ? seconds_ + dt : 0.0;
+    Vector6d difference = innovation + last_.receiver - innovation_;
+    difference.head<3>() += dt * last_.speed;
     if (seconds_ > kSettling) {
       const Vector6d u = innovation.cwiseQuotient(variance.cwiseSqrt());
-      follow(0, u.head<3>(), variance.head<3>().mean(), dt, o);
-      if (has_orientation) follow(1, u.tail<3>(), variance.tail<3>().mean(), dt, o);
+      const bool far = u.head<3>().norm() > kFarthest || u.tail<3>().norm() > kFarthest;
+      jumped_ = far && (jumped_ || has_jumped(difference, dt));
+      if (!jumped_) {
+        follow(0, u.head<3>(), variance.head<3>().mean(), dt, o);
+        if (has_orientation) follow(1, u.tail<3>(), variance.tail<3>().mean(), dt, o);
+      }
     }
     if (!(dt > 0.0 && dt < kLongest)) {
       known_ = 0;
     } else {
-      Vector6d difference = innovation + last_.receiver - innovation_;
-      difference.head<3>() += dt * last_.speed;
       if (known_ >= 2) {
         const double ratio = dt / step_;
         Vector6d second = difference - ratio * difference_;
@@ -93,7 +97,16 @@ class NoiseEstimate {
   static constexpr double kSettling = 2.0;  // after a start or a gap: what is expected is what is not known yet [s]
   static constexpr double kAveraged = 50.0;                    // innovations that one is compared with
   static constexpr double kBySize = 5.0, kByLikeness = 100.0;  // how fast factors move, over `noise_time`
+  static constexpr double kSlip = 0.5;    // speed that the inertial path may be off by [m/s], [rad/s]
   static constexpr double kAtOnce = 1.4;  // logarithm that noise grows by with a sample that is far off: four times
+
+  /// Whether the tracker alone can have made the difference to the sample before: no error of the inertial sensor does
+  /// in so short a time.
+  bool has_jumped(const Vector6d& difference, double dt) const {
+    const auto most = [&](double variance) { return kFarthest * std::sqrt(2.0 * variance) + kSlip * dt; };
+    return known_ > 0 &&
+           (difference.head<3>().norm() > most(found_[0]) || difference.tail<3>().norm() > most(found_[1]));
+  }
 
   /// Whitened innovations against one, and against the average of those before, each as far as it can tell.
   void follow(std::size_t which, const Eigen::Vector3d& whitened, double variance, double dt, const FilterOptions& o) {
@@ -124,6 +137,8 @@ class NoiseEstimate {
   double t_ = -1e300, step_ = 0.0, seconds_ = 0.0;
   int known_ = 0;  // samples behind `innovation_` and `difference_`
   bool had_orientation_ = false;
+  bool jumped_ =
+      false;  // the tracker has, and its samples are far off since: reflected signals, or a station has moved
   Vector6d innovation_ = Vector6d::Zero(), difference_ = Vector6d::Zero();
   Correction last_;
   Eigen::Vector3d before_ = Eigen::Vector3d::Zero();

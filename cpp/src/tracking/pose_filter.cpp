@@ -22,6 +22,7 @@ constexpr double kMark = 0.1;              // beliefs are kept at least so often
 constexpr double kSwayTime = 20.0;         // over which the size of the sway is averaged [s]
 constexpr double kScaleTime = 2.0;         // over which motion goes one way [s]
 constexpr double kClockFrom = 1.0;         // after the start, the clock is estimated [s]
+constexpr double kReflected = 0.5;         // longest burst of reflected signals [s]
 constexpr double kLargestFlangeGap = 0.1;  // between the two readings that one is interpolated from [s]
 
 std::int64_t power_of_two(double at_least) {
@@ -86,7 +87,9 @@ PoseFilter::PoseFilter(const TrackSetup& setup, const FilterOptions& options) : 
   imu_mask_ = static_cast<std::int64_t>(imu_.size()) - 1;
   flange_.resize(static_cast<std::size_t>(power_of_two(seconds * 1000.0)));
   flange_mask_ = static_cast<std::int64_t>(flange_.size()) - 1;
-  const auto events = static_cast<std::size_t>(seconds * (options.highest_pose_rate + 1.0 / kMark)) + 16;
+  marks_ = static_cast<int>((seconds + options.restart_gap) / kMark) + 8;
+  const auto events =
+      static_cast<std::size_t>(seconds * options.highest_pose_rate + 8.0) + static_cast<std::size_t>(marks_);
   events_.resize(events);
   order_.reserve(events);
   free_.reserve(events);
@@ -237,16 +240,10 @@ Outcome PoseFilter::insert(const Event& event) {
     if (this->event(i).kind == event.kind) return Outcome::duplicate;
     if (event.kind == Kind::mark) k = i;  // on one stamp marks come first
   }
-  if (free_.empty()) {  // more samples than the options speak of, or no inertial data: the oldest goes
-    update();
-    if (free_.empty()) {
-      free_.push_back(order_.front());
-      order_.erase(order_.begin());
-      dirty_ = std::max(0, dirty_ - 1);
-      k = std::max(0, k - 1);
-    } else {
-      k = first_event_after(event.t);
-    }
+  if (event.kind == Kind::pose && static_cast<int>(free_.size()) <= marks_) {  // places for marks are kept
+    make_room();
+    if (initialised_ && event.t < base_.t) return Outcome::too_late;
+    k = first_event_after(event.t);
   }
   const int slot = free_.back();
   free_.pop_back();
@@ -254,6 +251,15 @@ Outcome PoseFilter::insert(const Event& event) {
   order_.insert(order_.begin() + k, slot);
   set_dirty(k);
   return Outcome::accepted;
+}
+
+/// More samples than the options speak of, or no inertial data: the window begins later.
+void PoseFilter::make_room() {
+  update();
+  if (static_cast<int>(free_.size()) > marks_) return;
+  if (dirty_ > 0) return settle(1);
+  free_.push_back(order_.front());
+  order_.erase(order_.begin());
 }
 
 void PoseFilter::set_dirty(int k) { dirty_ = std::min(dirty_, k); }
@@ -464,7 +470,8 @@ void PoseFilter::measure_pose(Event* event, Belief* belief) const {
   grade.accepted = event->has_orientation ? fuse<6>(PHt, S, r, gate, belief, &grade.nis, &moved)
                                           : fuse<3>(PHt.leftCols<3>(), S.topLeftCorner<3, 3>(), r.head<3>(), gate,
                                                     belief, &grade.nis, &moved);
-  if (!grade.accepted && belief->rejected + 1 >= options_.reacquire_after) {
+  if (!grade.accepted && belief->rejected + 1 >= options_.reacquire_after &&
+      belief->t - belief->last_pose > kReflected) {
     // Either side may be wrong by now: speed and biases are known no better than at the start.
     const FilterOptions& o = options_;
     const auto widen = [&](int place, double variance) { belief->P.diagonal().segment<3>(place).array() += variance; };
@@ -684,7 +691,11 @@ void PoseFilter::trim() {
   const double start = newest_imu() - options_.window;
   int settled = 0;
   while (settled < dirty_ && event(settled).t < start) ++settled;
-  if (settled == 0) return;
+  if (settled > 0) settle(settled);
+}
+
+/// The first `settled` events leave the window.
+void PoseFilter::settle(int settled) {
   for (int k = 0; k < settled; ++k) {
     Event& e = event(k);
     const double before = k == 0 ? base_.t : event(k - 1).t;

@@ -161,6 +161,8 @@ class PoseFilter {
   void set_dirty(int k);
   void add_marks();
   void trim();
+  void settle(int settled);
+  void make_room();
   bool can_start_from(const Event& event) const;
   void start_from(const Event& first);
   void propagate(Belief* belief, double t);
@@ -183,6 +185,7 @@ class PoseFilter {
   std::vector<Event> events_;
   std::vector<int> order_, free_;
   int dirty_ = 0;  // first event whose belief is not right
+  int marks_ = 0;  // places among the events that are kept for marks
   double next_mark_ = 0.0;
   Belief base_;
   bool initialised_ = false, base_is_first_pose_ = false;

@@ -35,7 +35,7 @@ Vector6d log_frame(const Isometry3d& T) {
 }  // namespace
 
 ShiftWatch::ShiftWatch(const TrackSetup& setup, const WatchOptions& options) : setup_(setup), options_(options) {
-  rows_.resize(512);
+  rows_.resize(1024);
 }
 
 void ShiftWatch::restart() {
@@ -64,7 +64,10 @@ void ShiftWatch::push(const PoseGrade& grade, const Isometry3d* T_base_flange) {
   // Fraction of an innovation that is left after it was fused: R S^-1.
   const Cholesky<6> factor = cholesky<6>(grade.S);
   now.kept = Matrix6d::Identity();
-  if (grade.accepted) now.kept -= solve_factored<6, 6>(factor, grade.S - Matrix6d(grade.R.asDiagonal())).transpose();
+  if (grade.reacquired)
+    now.kept.setZero();  // widened by all that it disagreed by
+  else if (grade.accepted)
+    now.kept -= solve_factored<6, 6>(factor, grade.S - Matrix6d(grade.R.asDiagonal())).transpose();
   now.u = whitened<6, 1>(factor, grade.innovation);
   now.weight = grade.S.diagonal().cwiseInverse();
   if (now.u.norm() > kClip) now.u *= kClip / now.u.norm();
@@ -74,13 +77,17 @@ void ShiftWatch::push(const PoseGrade& grade, const Isometry3d* T_base_flange) {
           seconds);  // outliers come one by one, a shift stays
   if (comparing_)
     compare(now);
-  else
+  else if (pending_ == 0)
     learn_deviation(now);
   const bool after_effect = shift_.count > 0 && grade.t - shift_.t < options_.compare;
-  if (pending_ > 0 && --pending_ == 0)
-    flag();  // the jump is judged by samples after it
-  else if (pending_ == 0 && level_ > 1.0 && quiet_ > kWarmUp && !after_effect)
+  if (pending_ > 0) {
+    // Judged by samples after it, and not while the filter refuses them: then either they come back, or it follows.
+    ++back_;
+    pending_ = rejected_ > 0 ? std::max(pending_, kLasting) : pending_ - 1;
+    if (pending_ == 0) flag();
+  } else if (level_ > 1.0 && quiet_ > kWarmUp && !after_effect) {
     pending_ = kBehind;
+  }
 }
 
 /// Averages of whitened innovations over four lengths. Each would be chi-square distributed with six degrees of freedom
@@ -135,6 +142,8 @@ std::int64_t ShiftWatch::find_onset() const {
       best = k;
     }
   }
+  // Where samples count with no more than they may, all sums are alike: the first of them.
+  while (best > oldest && row(best - 1).u.dot(row(best).u) > 0.5 * kClip * kClip) --best;
   return best;
 }
 

@@ -871,6 +871,27 @@ TEST_CASE("bursts of reflected signals, up to seven samples long, are not taken 
   }
 }
 
+TEST_CASE("bursts of reflected signals, up to half a second, are neither followed nor a shift: seeds 19 to 22") {
+  for (std::uint64_t seed = 19; seed <= (kSanitized ? 19 : 22); ++seed) {
+    CAPTURE(seed);
+    SimulatedStreams s = simulate_streams(large_boom(), watched(seed, 40.0));
+    math::Random random(seed);
+    for (std::size_t k = 150; k + 50 < s.tracker.size(); k += 300) {
+      const Vector3d direction = Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+      const std::size_t until = k + static_cast<std::size_t>(random.uniform(3.0, 45.0));
+      for (std::size_t i = k; i < until; ++i) s.tracker[i].position += random.uniform(0.05, 0.5) * direction;
+    }
+    CHECK(watch(s, 1e9).before == 0);
+    CHECK(consistency(s, FilterOptions()).error < 5e-3);
+  }
+}
+
+TEST_CASE("a tracker that is faster than the options say is followed: seed 23") {
+  StreamSimulationOptions options = watched(23, 8.0);
+  options.tracker_rate = 1000.0;
+  CHECK(consistency(simulate_streams(large_boom(), options), FilterOptions()).error < 1e-3);
+}
+
 TEST_CASE("corrections keep their rate and jerk whatever is wanted: 300 runs of steps and sways, seed 1") {
   math::Random random(1);
   const CorrectionLimits limits;
