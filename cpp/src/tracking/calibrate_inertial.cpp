@@ -586,8 +586,8 @@ struct TrackerReading {
 constexpr TrackerReading kReadings[] = {
     {"Inertial sensor and tracker agree if the tracker's positions are in mm, and were read as m.", 1e-3, false},
     {"Inertial sensor and tracker agree if the tracker's positions are in m, and were read as mm.", 1e3, false},
-    {"Inertial sensor and tracker agree if the tracker's frame is left-handed: an axis has the wrong sign, or two axes "
-     "are swapped.",
+    {"Inertial sensor and tracker agree if the specific force has the other sign (it points up at rest), or if one of "
+     "the two has a left-handed frame: an axis has the wrong sign, or two axes are swapped.",
      1.0, true},
 };
 

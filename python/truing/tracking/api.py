@@ -48,7 +48,10 @@ _LEAST_DRIFT = 5e-5  # [s/s] what is less the filter finds by itself
 _TUNED_FOR, _SETTLING = 0.04, 3.0  # [s]
 _FACTORS, _TRACKER_FACTORS = (1.0, 3.0, 10.0, 30.0, 100.0), (1.0, 3.0)
 _STATIC_TIMES = (1.0, 0.5, 0.2, 0.1)  # [s]
+_ELSEWHERE = 0.05  # [m] a receiver or tool that is farther off than this is another one
+_TURNS = 1.5  # times the squares that have to be left without it
 _LEANING = 0.2  # [rad] gravity by the inertial sensor and by encoders: no sway, sag or bias makes so much
+_REVERSED = 2.8  # [rad] likewise: the specific force seems to have the other sign
 _CLEAR = 0.2  # another reading of the numbers has to be so much better before it is named
 
 
@@ -78,6 +81,8 @@ def recorded_streams(
         tracker = replace(tracker, t=where.steady(tracker.t))
     imu, tracker, plan, joints = _aligned(robot, setup, imu, joints, tracker, plan)
     check_streams(robot, setup, imu=imu, joints=joints, tracker=tracker)
+    if plan is not None:
+        _check_plan(robot, setup, joints, plan)
     tied = 0.0 if imu.arrival is None else float(np.min(imu.arrival - imu.t))
     streams = _core.RecordedStreams()
     streams.set_imu(imu.t, imu.gyro, imu.accel, _arrival(imu, tied, 0.0))
@@ -192,6 +197,25 @@ def _require_overlap(name: str, stream: JointData | TrackerData, t: Floats, imu:
         )
 
 
+def _check_plan(robot: _core.Robot, setup: _core.TrackSetup, joints: JointData, plan: PoseData) -> None:
+    """The planned tool against the encoders': joints follow their plan."""
+    rows = _spread_out(len(joints.t))
+    at = joints.t[rows] - setup.actuator_lag
+    rows = rows[(at >= plan.t[0]) & (at <= plan.t[-1])]
+    if not rows.size:
+        return
+    tool = _core.flange_poses(robot, joints.joints[rows]) @ np.asarray(setup.T_flange_tool)
+    near = np.clip(np.searchsorted(plan.t, joints.t[rows] - setup.actuator_lag), 0, len(plan.t) - 1)
+    off = float(np.median(np.linalg.norm(plan.T[near, :3, 3] - tool[:, :3, 3], axis=1)))
+    if off > _ELSEWHERE:
+        warnings.warn(
+            f"{plan.path}: the planned tool is {off:.2g} m from where encoders and T_flange_tool have it: is"
+            " it the plan of this recording, for this tool and base? Corrections are to the plan as it is",
+            InputWarning,
+            stacklevel=3,
+        )
+
+
 def _spread_out(rows: int) -> NDArray[np.intp]:
     return np.linspace(0, rows - 1, min(rows, _FEW)).astype(np.intp)
 
@@ -230,7 +254,8 @@ def _check_imu_axes(setup: _core.TrackSetup, imu: ImuData, t: Floats, flange: Fl
         raise InputError(
             f"{imu.path}, column 'ax_m_s2': at the mean of the recording the sensor feels gravity"
             f" {np.degrees(usual):.3g} deg from where encoders and T_flange_imu of the set-up have it: are"
-            " the sensor's axes those of the set-up? `truing track calibrate` finds them"
+            f" the sensor's axes{' and the sign of its specific force' if usual > _REVERSED else ''} those of"
+            " the set-up? `truing track calibrate` finds them"
         )
 
 
@@ -252,6 +277,7 @@ def _check_tracker(setup: _core.TrackSetup, tracker: TrackerData, t: Floats, fla
     usual = off(measured)
     if usual <= limit:
         _check_orientation(tracker, rows, expected)
+        _check_receiver(setup, tracker, flange[near], measured)
         return
     readings = [
         (off(1e-3 * measured), "positions in mm: call the columns x_mm y_mm z_mm, or convert them"),
@@ -290,6 +316,39 @@ def _check_tracker(setup: _core.TrackSetup, tracker: TrackerData, t: Floats, fla
         f"{where}, expected below {limit:.3g} m: is this the set-up of this recording? `truing track"
         " calibrate` finds it anew"
     )
+
+
+def _check_receiver(setup: _core.TrackSetup, tracker: TrackerData, flange: Floats, measured: Floats) -> None:
+    """Whether the receiver is elsewhere on the flange than the set-up says: such an error turns with the
+    flange. One of the tracker's frame stands still, sag goes downwards and depends on the reach.
+    """
+    R_tracker_base = np.asarray(setup.T_tracker_base)[:3, :3]
+    place = flange @ np.asarray(setup.T_flange_receiver)
+    off = (measured - np.asarray(setup.T_tracker_base)[:3, 3]) @ R_tracker_base - place[:, :3, 3]
+    down = np.asarray(setup.gravity) / np.linalg.norm(setup.gravity)
+    reach = np.linalg.norm(np.cross(place[:, :3, 3], down), axis=1)
+    standing = np.tile(np.eye(3), (len(off), 1, 1))
+    sag = np.stack([np.outer(reach, down), np.outer(reach**2, down)], axis=2)
+    without = np.concatenate([standing, sag], axis=2)
+
+    def fit(columns: Floats, rows: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+        A = columns[rows].reshape(-1, columns.shape[2])
+        found = np.asarray(np.linalg.lstsq(A, off[rows].ravel(), rcond=1e-6)[0], dtype=np.float64)
+        return found, np.asarray(np.linalg.norm(columns @ found - off, axis=1))
+
+    turning = np.concatenate([flange[:, :3, :3], without], axis=2)
+    length = fit(turning, np.ones(len(off), dtype=bool))[1]
+    rows = length <= 4 * np.median(length)  # reflected signals do not count
+    found, length = fit(turning, rows)
+    left, before = np.mean(length[rows] ** 2), np.mean(fit(without, rows)[1][rows] ** 2)
+    elsewhere = float(np.linalg.norm(found[:3]))
+    if elsewhere > _ELSEWHERE and before > _TURNS * left:
+        raise InputError(
+            f"{tracker.path}: the receiver is {elsewhere:.2g} m from where T_flange_receiver of the set-up"
+            f" has it, for the difference to the encoders turns with the flange ({before**0.5:.2g} m rms, and"
+            f" {left**0.5:.2g} m if the receiver is there): has it been mounted anew? `truing track"
+            " calibrate` finds it"
+        )
 
 
 def _check_orientation(tracker: TrackerData, rows: NDArray[np.intp], expected: Floats) -> None:

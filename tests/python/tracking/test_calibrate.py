@@ -321,6 +321,23 @@ def test_frames_that_cannot_be_are_named(change: Any, message: str) -> None:
     assert "board" not in found.message and "reading" not in found.message
 
 
+def test_a_receiver_that_is_mounted_elsewhere_is_refused() -> None:
+    """By 18 cm."""
+    r = recording()
+    setup = truing.track_calibrate(ROBOT, r.joints, r.tracker, r.imu).where.setup
+    elsewhere = np.array(setup.T_flange_receiver)
+    elsewhere[:3, 3] += [0.12, -0.12, 0.06]
+    moved = setup.replace(T_flange_receiver=elsewhere)
+    with pytest.raises(InputError, match=r"the receiver is 0\.1.* m from .* turns with the flange"):
+        truing.recorded_streams(ROBOT, moved, imu=r.imu, joints=r.joints, tracker=r.tracker)
+
+
+def test_a_specific_force_with_the_other_sign_is_named() -> None:
+    r = recording()
+    found = truing.track_calibrate(ROBOT, r.joints, r.tracker, dataclasses.replace(r.imu, accel=-r.imu.accel))
+    assert found.status == "not consistent" and "specific force has the other sign" in found.message
+
+
 def test_a_tracker_without_orientations_is_refused() -> None:
     r = recording()
     with pytest.raises(InputError, match="there are no columns qw qx qy qz"):

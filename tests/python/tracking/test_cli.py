@@ -20,6 +20,7 @@ from pages import charts_of, visible
 from tables import columns
 from truing.cli import main
 from truing.examples import example
+from truing.files.stream_file import save_plan, save_tracker
 from truing.rotations import rotations_from_quaternions
 
 FORMAT = {
@@ -324,6 +325,27 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and f"{bad}, line 52, column 't_s': time goes backwards" in error
     assert not (tmp_path / "out").exists()
+
+
+def test_a_plan_of_another_tool_is_said(recording: Path, tmp_path: Path) -> None:
+    plan = truing.load_plan(recording / "plan.csv")
+    T = plan.T.copy()
+    T[:, :3, 3] += 0.3 * T[:, :3, 0]
+    other = tmp_path / "plan.csv"
+    save_plan(other, plan.t, T)
+    assert main(arguments(recording, "--out", str(tmp_path / "out"), plan=other)) == 0
+    assert "the planned tool is 0.3 m from" in " ".join(result_of(tmp_path / "out")["warnings"])
+
+
+def test_a_tracker_clock_that_jumps_is_said(recording: Path, tmp_path: Path) -> None:
+    """By 1 s, seed 3."""
+    tracker = truing.load_tracker(recording / "tracker.csv")
+    assert tracker.orientation is not None and tracker.arrival is not None
+    jumped = tmp_path / "tracker.csv"
+    t = tracker.t + (tracker.t > tracker.t.mean())
+    save_tracker(jumped, t, tracker.position, tracker.orientation, tracker.arrival)
+    assert main(arguments(recording, "--out", str(tmp_path / "out"), tracker=jumped)) == 0
+    assert "has the tracker's clock jumped" in " ".join(result_of(tmp_path / "out")["warnings"])
 
 
 def test_ctrl_c_leaves_nothing(recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ modes if they were identified. Exit status 1 if there is a plan and none of it c
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from truing.model import Robot
     from truing.tracking.result import Played
 
+UNPLACED = 0.1  # of the tracker's samples: when more are not used, it is said
 GRADED_AT = (0.02, 0.04, 0.08)  # [s] horizons at which predictions are graded, besides --horizon
 BASELINES = {
     "truing": "truing",
@@ -122,6 +124,7 @@ class Command(run.Command[Loaded, "Played"]):
             learn_modes=0.0 if where.modes.count or plan is None else self.learn_modes,
             progress=progress.fraction,
         )
+        say_unplaced(loaded.tracker.path, played.counters["pose"])
         tracker_t = where.steady(loaded.tracker.t) - where.setup.clock_offset
         plan_t = np.empty(0) if plan is None else plan.t
         return Played(loaded.robot, where, played, self.horizon, plan_t, tracker_t, loaded.truth)
@@ -157,6 +160,21 @@ class Command(run.Command[Loaded, "Played"]):
         return (
             "no row of the plan could be compensated: the streams do not reach it, or the tracker was never"
             " there"
+        )
+
+
+def say_unplaced(tracker: Path, counts: Mapping[str, int]) -> None:
+    """Says so where stamps of the tracker do not fit the inertial sensor's clock."""
+    from truing.errors import InputWarning
+
+    future, late = counts.get("future", 0), counts.get("too_late", 0)
+    every = sum(counts.values()) - counts.get("outlier", 0) - counts.get("reacquired", 0)
+    if future + late > UNPLACED * every:
+        warnings.warn(
+            f"{tracker}: {future} of {every} samples have stamps ahead of the inertial sensor's clock, {late}"
+            " came too late, and are not used: has the tracker's clock jumped?",
+            InputWarning,
+            stacklevel=2,
         )
 
 
