@@ -48,7 +48,8 @@ def friction_torque(parameters: Mapping[str, float], speed: Floats, load: float 
         out = out + value("viscous_law.saturating", 0.0) * np.tanh(speed / parameters["viscous_law.v0"])
     if "stribeck.vs" in parameters:
         out = out + value("stribeck", 0.0) * direction * np.exp(-((speed / parameters["stribeck.vs"]) ** 2))
-    return np.asarray(out + value("load_friction", 0.0) * direction * abs(load))
+    grows = value("load_friction", 0.0) + value("load_friction.links", 0.0)
+    return np.asarray(out + grows * direction * abs(load))
 
 
 def friction_dict(robot: _core.Robot, where: Sequence[_core.TorqueRegime]) -> list[dict[str, Any]]:
@@ -64,7 +65,8 @@ def friction_dict(robot: _core.Robot, where: Sequence[_core.TorqueRegime]) -> li
         if not any(key.split(".")[0] in (*_LAWS, "load_friction") for key in parameters):
             continue
         fastest = _reached(where, joint.name, "speed") or 1.0
-        load = _reached(where, joint.name, "load") if "load_friction" in parameters else 0.0
+        grows = any(key.split(".")[0] == "load_friction" for key in parameters)
+        load = _reached(where, joint.name, "load") if grows else 0.0
         speed = np.linspace(-fastest, fastest, POINTS)
         speed[POINTS // 2] = np.nan  # friction jumps at rest: the line is broken there
         out.append(

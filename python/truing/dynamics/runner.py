@@ -199,6 +199,8 @@ class Runner:
         rows = [of.links.index(name) for name in of.driven]
         self.zero = of.start[rows]
         self.spec = int(self.mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        first = 1 + self.model.nq  # of the speeds in such a state, after time and positions
+        self.speeds = slice(first, first + self.model.nv)
         self.bristles = [self._bristles(track) for track in tracks]
         self._loaded: dict[tuple[float, ...], Any] = {}
 
@@ -337,8 +339,8 @@ class Runner:
         if self.of.beside is None:
             spec = self.mujoco.mjtState.mjSTATE_QFRC_APPLIED
             return states, self._rollout(models, states, applied, spec)
-        warmth = self._warmth(starts, track)
-        return states, self._with_callbacks(self.of.beside, models, states, applied, torque, *warmth)
+        warmth, qacc = self._warmth(starts, track), self._accelerations(starts, track)
+        return states, self._with_callbacks(self.of.beside, models, states, applied, torque, *warmth, qacc)
 
     def _rollout(self, models: list[Any], states: Floats, inputs: Floats, spec: Any) -> Floats:
         """models: of each window. spec: which part of MuJoCo's state the inputs are.
@@ -358,6 +360,7 @@ class Runner:
         torque: Floats,
         warm: Floats,
         begun: Floats,
+        qacc: Floats,
     ) -> Floats:
         """Few steps at a time: each window has a model of its own, whose dry friction changes with its
         state. On one thread: to wake others for two steps takes longer than the steps on a busy machine."""
@@ -377,15 +380,39 @@ class Runner:
                 q = (state[:, 1 + self.qpos] - self.zero) / ratios
                 qd = state[:, 1 + m.nq + self.dofs] / ratios
                 now = (q, qd, torque[:, k], warm, begun + k * m.opt.timestep)
-                friction = beside.dry_friction(*now) / np.abs(ratios)
+                links = self._link_torques(models, state[:, 1:], qacc) if beside.of_links() else None
+                friction = beside.dry_friction(*now, links=links) / np.abs(ratios)
                 for loss, row in zip(losses, friction, strict=True):
                     loss[self.dofs] = row
                 smooth = beside.smooth_torques(*now) / ratios
                 applied[:, k:end, self.dofs] += smooth[:, None]
                 part, _ = pool.rollout(models, data, state, applied[:, k:end], control_spec=spec)
                 path[:, k:end] = part
+                qacc = (part[:, -1] - state)[:, self.speeds] / ((end - k) * m.opt.timestep)
                 state = np.ascontiguousarray(part[:, -1])
         return path
+
+    def _accelerations(self, starts: Floats, track: NDArray[np.intp]) -> Floats:
+        """As measured at times of tracks. shape=(n, nv) [rad/s^2 | m/s^2]"""
+        out = np.zeros((starts.size, self.model.nv))
+        for k, (start, t) in enumerate(zip(starts, track, strict=True)):
+            near = self.tracks[t].near(start, start)
+            out[k, self.link_dofs] = self.of.coupling @ table_at(near.time, near.qdd, np.array([start]))[0]
+        return out
+
+    def _link_torques(self, models: Sequence[Any], motion: Floats, qacc: Floats) -> Floats:
+        """What the links take of each drive. motion: positions and speeds, shape=(n, nq + nv)
+        shape=(n, joints) [Nm | N]"""
+        data, nq = self.mujoco.MjData(self.model), self.model.nq
+        out = np.empty((len(models), self.qpos.size))
+        for k, model in enumerate(models):
+            data.qpos[:], data.qvel[:] = motion[k, :nq], motion[k, nq : nq + self.model.nv]
+            data.qacc[:] = qacc[k]
+            self.mujoco.mj_kinematics(model, data)
+            self.mujoco.mj_comPos(model, data)
+            self.mujoco.mj_comVel(model, data)
+            out[k] = self.of.beside.link_torques(model, data, self.link_dofs)
+        return out
 
     # ---- backward
 
@@ -401,7 +428,8 @@ class Runner:
             warm = table_at(track.torque_time, track.temperature, track.time[rows])
             warm = np.where(np.isnan(warm), of.beside.REFERENCE_C, warm)
             now = (q, qd, drive, warm, (track.time[rows] - track.began)[:, None])
-            friction = of.beside.dry_friction(*now) / np.abs(of.ratios)
+            links = self._link_torques_along(track, rows) if of.beside.of_links() else None
+            friction = of.beside.dry_friction(*now, links=links) / np.abs(of.ratios)
             smooth = of.beside.smooth_torques(*now)
         out = np.empty_like(q)
         copies: dict[int, Any] = {}  # that friction is written into
@@ -422,3 +450,14 @@ class Runner:
             left = data.qfrc_inverse - data.qfrc_actuator  # the passive ones give their part
             out[k] = of.coupling.T @ left[self.link_dofs] - smooth[k]
         return out
+
+    def _link_torques_along(self, track: Track, rows: NDArray[np.intp]) -> Floats:
+        """What the links take of each drive in rows of a track. shape=(rows, joints) [Nm | N]"""
+        m, coupling = self.model, self.of.coupling.T
+        motion = np.tile(np.concatenate([m.qpos0, np.zeros(m.nv)]), (rows.size, 1))
+        motion[:, self.links] = self.of.start + track.q[rows] @ coupling
+        motion[:, m.nq + self.link_dofs] = track.qd[rows] @ coupling
+        qacc = np.zeros((rows.size, m.nv))
+        qacc[:, self.link_dofs] = track.qdd[rows] @ coupling
+        models = [self._with_payload(track.payload_at(time)) for time in track.time[rows]]
+        return self._link_torques(models, motion, qacc)

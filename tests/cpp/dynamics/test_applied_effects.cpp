@@ -83,6 +83,25 @@ TEST_CASE("what a model needs the torque for sees that of another where it was t
   CHECK((seen - others).cwiseAbs().minCoeff() > 99.0);
 }
 
+TEST_CASE("load friction is of what the motor gives, or of what the links take: not of friction and rotors") {
+  Robot robot = one_joint();
+  robot.joints.front().rotor_inertia = 0.7;
+  Motion motion;
+  motion.robot = &robot;
+  motion.q = Eigen::MatrixXd::Zero(4, 1);
+  motion.qd = Eigen::MatrixXd::Ones(4, 1);
+  motion.qdd = Eigen::VectorXd::LinSpaced(4, -3.0, 3.0);
+  motion.time = Eigen::VectorXd::LinSpaced(4, 0.0, 0.3);
+  const dynamics::TorqueModel sliding(robot, {{terms("viscous", {{"", 1.0}}).front(), 5.0}});
+  const Eigen::MatrixXd whole = sliding.torque(&motion);
+  const Eigen::MatrixXd links = whole - 5.0 * motion.qd - 0.7 * motion.qdd;
+  CHECK((motion.carried - links).cwiseAbs().maxCoeff() < 1e-12);
+  CHECK((terms("load_friction", {{"", 1.0}}).front().basis(motion) - whole.cwiseAbs()).cwiseAbs().maxCoeff() < 1e-9);
+  const Eigen::MatrixXd found = terms("load_friction", {{".links", 1.0}}).front().basis(motion);
+  CHECK((found - links.cwiseAbs()).cwiseAbs().maxCoeff() < 1e-9);
+  CHECK(links.cwiseAbs().maxCoeff() > 0.01);
+}
+
 TEST_CASE("a link that crosses its play falls out of the motor's torque, and its impact gives back what it missed") {
   const Robot robot = one_joint();  // its axis is upright: inertia is all the load
   const double play = 5e-3, step = 0.01, inertia = 2.0 * 0.1 * 0.1;

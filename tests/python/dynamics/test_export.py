@@ -271,7 +271,7 @@ def load(path: Path) -> Any:
 
 BESIDE = [
     applied("coulomb", J1=1.0, J2=0.5),
-    applied("load_friction", J1=0.1),
+    applied("load_friction", J1=0.1, J1__links=0.2),
     applied("position_friction", J2__sin=0.2, J2__cos=-0.1),
     applied("viscous_law", J4__root=0.7),
     applied("viscous_law", J4__saturating=0.4, J4__v0=0.2),
@@ -287,10 +287,11 @@ def test_callbacks_have_the_laws_that_mujoco_lacks(tmp_path: Path) -> None:
     assert exported.callbacks is not None
     beside = load(exported.callbacks)
     rng = np.random.default_rng(0)
-    q, qd, drive = rng.normal(size=(3, 30, 4))
-    dry = beside.dry_friction(q, qd, drive, temperature=35.0, time=100.0)
+    q, qd, drive, links = rng.normal(size=(4, 30, 4))
+    dry = beside.dry_friction(q, qd, drive, temperature=35.0, time=100.0, links=links)
     v = np.abs(qd)
-    assert dry[:, 0] == pytest.approx(1.0 + 0.1 * np.abs(drive[:, 0]) + 0.01 * 15.0)
+    of_load = 0.1 * np.abs(drive[:, 0]) + 0.2 * np.abs(links[:, 0])
+    assert dry[:, 0] == pytest.approx(1.0 + of_load + 0.01 * 15.0)
     second = 0.5 + 0.2 * np.sin(q[:, 1]) - 0.1 * np.cos(q[:, 1]) + 0.001 * 100.0
     assert dry[:, 1] == pytest.approx(second)
     assert dry[:, 3] == pytest.approx(0.7 * np.sqrt(v[:, 3]) + 0.4 * np.tanh(v[:, 3] / 0.2))
@@ -321,6 +322,31 @@ def test_installed_callbacks_hold_a_loaded_joint(tmp_path: Path) -> None:
         data.ctrl[0] = 2.0
         mujoco.mj_step(model, data, 300)
         assert abs(data.qpos[0]) > 20.0 * held
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+def test_installed_callbacks_ask_mujoco_what_a_link_takes(tmp_path: Path) -> None:
+    # No gravity: a link that is pushed against 1 Nm takes what makes it faster, and not what friction holds.
+    effects = [
+        applied("load_friction", J1__links=0.3),
+        applied("coulomb", J1=1.0),
+        applied("armature", J1=2.0),
+    ]
+    robot = arm("urdf").replace(torque_effects=effects, gravity=[0.0, 0.0, 0.0])
+    exported = export(robot, "mjcf", tmp_path)
+    assert exported.callbacks is not None
+    model = mujoco.MjModel.from_xml_path(str(exported.model))
+    data = mujoco.MjData(model)
+    load(exported.callbacks).install(model)
+    try:
+        data.ctrl[0] = 4.0
+        mujoco.mj_step(model, data, 300)
+        accelerated = data.qacc[0] * model.dof_armature[0]  # the link takes what is left of it and friction
+        assert data.qfrc_constraint[0] == pytest.approx(-model.dof_frictionloss[0], rel=1e-3)
+        link = 4.0 + data.qfrc_constraint[0] + data.qfrc_passive[0] - accelerated
+        assert link > 0.1
+        assert model.dof_frictionloss[0] == pytest.approx(1.0 + 0.3 * link, rel=1e-3)
     finally:
         mujoco.set_mjcb_passive(None)
 

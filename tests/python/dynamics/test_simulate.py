@@ -61,15 +61,15 @@ def two_links(*effects: AppliedEffect) -> Robot:
     return Robot("two links", joints=joints, convention="urdf", torque_effects=effects)
 
 
-def move(seed: int, load: tuple[float, float], duration: float = 6.0) -> Recording:
-    table = moved(seed, load, duration)
+def move(seed: int, load: tuple[float, float], duration: float = 6.0, *, of_links: bool = False) -> Recording:
+    table = moved(seed, load, duration, of_links)
     return Recording(f"motion {seed}", table[:, 0], table[:, 1:3].copy(), table[:, 3:].copy())
 
 
 @functools.cache
-def moved(seed: int, load: tuple[float, float], duration: float) -> Floats:
+def moved(seed: int, load: tuple[float, float], duration: float, of_links: bool) -> Floats:
     """The arm led by a controller, integrated in tenths of a millisecond: time, positions, torques, 200
-    rows a second."""
+    rows a second. of_links: friction grows with what the links take, else with what the motor gives."""
     model = pin.Model()
     parent = 0
     for joint in two_links().joints:
@@ -78,11 +78,12 @@ def moved(seed: int, load: tuple[float, float], duration: float) -> Floats:
         )
         inertia = pin.Inertia(joint.mass, np.array(joint.center_of_mass), np.array(joint.inertia))
         model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    links = model.copy()
     model.armature = np.array([0.2, 0.2])
-    data = model.createData()
+    data, of_the_links = model.createData(), links.createData()
     rng = np.random.default_rng(seed)
     w, phase = rng.uniform(1.0, 3.0, size=(2, 2)), rng.uniform(0.0, 6.0, size=(2, 2))
-    h, q, qd, rows = 1e-4, np.zeros(2), np.zeros(2), []
+    h, q, qd, qdd, rows = 1e-4, np.zeros(2), np.zeros(2), np.zeros(2), []
     for k in range(int(duration / h)):
         t = k * h
         wanted = 0.5 * (np.sin(w * t + phase) - np.sin(phase)).sum(axis=1)
@@ -90,9 +91,11 @@ def moved(seed: int, load: tuple[float, float], duration: float) -> Floats:
         torque = 400.0 * (wanted - q) + 60.0 * (rate - qd) + pin.computeGeneralizedGravity(model, data, q)
         if k % 50 == 0:
             rows.append(np.concatenate([[t], q, torque]))
-        dry = np.array(COULOMB) + np.array(load) * np.abs(torque)
+        carried = pin.rnea(links, of_the_links, q, qd, qdd) if of_links else torque
+        dry = np.array(COULOMB) + np.array(load) * np.abs(carried)
         friction = dry * np.tanh(qd / 1e-3) + np.array(VISCOUS) * qd
-        qd = qd + h * pin.aba(model, data, q, qd, torque - friction)
+        qdd = pin.aba(model, data, q, qd, torque - friction)
+        qd = qd + h * qdd
         q = q + h * qd
     return np.array(rows)
 
@@ -121,6 +124,22 @@ def test_callbacks_add_what_the_file_cannot_say() -> None:
     assert with_them.worst_joint("named", 0.5) < 2e-3
     assert without.worst_joint("named", 0.5) > 2.0 * with_them.worst_joint("named", 0.5)
     assert standard.worst_joint("standard", 0.5) > without.worst_joint("named", 0.5)
+
+
+def test_callbacks_know_what_the_links_take_of_a_torque() -> None:
+    recordings = [move(4, (0.3, 0.2), of_links=True)]
+    named, motor = (
+        two_links(
+            *STANDARD,
+            AppliedEffect(
+                "load_friction", ["J1", "J2"], {f"load_friction.J1{of}": 0.3, f"load_friction.J2{of}": 0.2}
+            ),
+        )
+        for of in (".links", "")
+    )
+    found = judge({"links": named, "motor": motor}, recordings, horizons=(0.5,))
+    assert found.worst_joint("links", 0.5) < 2e-3
+    assert found.worst_joint("motor", 0.5) > 5.0 * found.worst_joint("links", 0.5)
 
 
 def test_temperature_and_time_of_the_recording_reach_the_callbacks() -> None:

@@ -159,12 +159,17 @@ std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const 
                               [joint](const Motion& m, Phi phi) { phi = speed(m, joint).abs(); }))}};
 }
 
-// Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011).
+// Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011): of what their motor gives, or of what their
+// link takes.
 std::vector<TorqueForm> load_friction(const Robot& robot, std::size_t joint, const MotionRange&) {
-  const auto column = [joint](const Motion& m, Phi phi) {
-    phi = direction(m, joint) * m.torque.col(static_cast<Index>(joint)).array().abs();
+  const auto of = [&](const std::string& parameter, MatrixXd Motion::* load) -> TorqueForm {
+    const auto column = [joint, load](const Motion& m, Phi phi) {
+      phi = direction(m, joint) * (m.*load).col(static_cast<Index>(joint)).array().abs();
+    };
+    return {within(term_at(joint, parameter, "-", 0.3, column, true), 0.0, 0.6)};
   };
-  return {{within(term_at(joint, parameter_name("load_friction", robot, joint), "-", 0.3, column, true), 0.0, 0.6)}};
+  return {of(parameter_name("load_friction", robot, joint), &Motion::torque),
+          of(parameter_name("load_friction", robot, joint, "links"), &Motion::carried)};
 }
 
 std::vector<TorqueForm> position_friction(const Robot& robot, std::size_t joint, const MotionRange& range) {
@@ -237,8 +242,8 @@ std::vector<TorqueEffect> friction_effects() {
                         {"abs(qd)", "`asymmetric_friction.J2` [Nm s/rad]", "motion both ways"})});
   out.push_back({"load_friction", "friction that grows with the load that the gear carries", load_friction, true,
                  traits("friction that grows with the load", Place::callback, Place::none,
-                        {"s abs(tau), tau the whole torque that the model predicts", "`load_friction.J2` [-]",
-                         "two loads, or gravity that changes"})});
+                        {"s abs(tau), tau the whole torque that the model predicts, or what the links take of it",
+                         "`load_friction.J2` or `load_friction.J2.links` [-]", "two loads, or gravity that changes"})});
   out.push_back({"position_friction", "friction that changes over a turn of the joint", position_friction, true,
                  traits("friction that changes with the joint's angle", Place::callback, Place::none,
                         {"s sin q, s cos q", "`position_friction.J2.sin`, `.cos` [Nm]", "a wide range of angles"})});

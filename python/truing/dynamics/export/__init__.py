@@ -173,7 +173,7 @@ def _written(
     """alone: the MJCF is used without callbacks.py, which it says does not belong to it."""
     chain = chain_of(robot)
     usual = reference_motion(robot, chain)
-    reference = recorded_motion(robot, recordings) if recordings else usual
+    reference = recorded_motion(robot, chain, recordings) if recordings else usual
     parts = parts_of(robot, chain, reference)
     name = file_name(robot.name)
     if to == "mjcf":
@@ -285,6 +285,8 @@ def _callbacks_text(chain: Chain, model: mjcf.Model) -> str:
     values: dict[str, tuple[str, Any]] = {
         "JOINTS": ("list[str]", [link.name for link in chain.driven]),
         "RATIOS": ("list[float]", [link.ratio for link in chain.driven]),
+        "LINKS": ("list[str]", [link.name for link in chain.links]),
+        "COUPLING": ("list[list[float]]", coupling_matrix(chain).tolist()),
         "EFFECTS": ("list[Effect]", model.beside),
         "FIELDS": ("dict[str, list[float]]", model.fields_beside),
     }

@@ -8,9 +8,9 @@
 
 `install` sets MuJoCo's passive callback for this model; other models are left alone. What resists motion is
 told to MuJoCo as dry friction (`dof_frictionloss`) that changes with state, so that a joint sticks as it
-should; the rest is added to `qfrc_passive`. Both see the motors' torque of the step before. Without
-MuJoCo's callback (many simulations at once) call `dry_friction` and `smooth_torques` with arrays of any
-number of rows. It needs numpy.
+should; the rest is added to `qfrc_passive`. Both see the motors' torque and the accelerations of the step
+before. Without MuJoCo's callback (many simulations at once) call `dry_friction` and `smooth_torques` with
+arrays of any number of rows, and `link_torques` of every state. It needs numpy.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ JOINTS: list[str] = []
 """Names of the joints that have a reading; columns of all tables are in this order."""
 RATIOS: list[float] = []
 """A joint of the model is at ratio * reading; the tables here are of readings."""
+LINKS: list[str] = []
+"""Names of all joints of the chain."""
+COUPLING: list[list[float]] = []
+"""Motion of each of LINKS for readings of one, one row a joint."""
 EFFECTS: list[Effect] = []
 FIELDS: dict[str, list[float]] = {}
 """`frictionloss` [Nm | N] and `damping` [Nm s/rad | N s/m] at the readings, to which the effects are
@@ -48,20 +52,23 @@ def dry_friction(
     time: ArrayLike = 0.0,
     effects: Sequence[Effect] | None = None,
     base: Sequence[float] | None = None,
+    links: ArrayLike | None = None,
 ) -> Floats:
     """What holds each joint back, without its sign. shape=(n, joints) [Nm | N]
 
-    q, qd: readings and their speeds. drive: torques of the motors. All shape=(n, joints). temperature [deg
-    C] and time [s] of switched-on drives: a number, (n, 1) or (n, joints).
+    q, qd: readings and their speeds. drive: torques of the motors. links: what of them the links take
+    (`link_torques`); as much as the motors give where it is not known. All shape=(n, joints). temperature
+    [deg C] and time [s] of switched-on drives: a number, (n, 1) or (n, joints).
     """
     q, qd, drive, warm, time = _tables(q, qd, drive, temperature, time)
+    carried = drive if links is None else np.atleast_2d(np.asarray(links, dtype=float))
     out = np.zeros_like(q) + (FIELDS["frictionloss"] if base is None else base)
     for name, j, _, p in EFFECTS if effects is None else effects:
         speed = np.abs(qd[:, j])
         if name == "coulomb":
             out[:, j] += p[""]
         elif name == "load_friction":
-            out[:, j] += p[""] * np.abs(drive[:, j])
+            out[:, j] += p.get("", 0.0) * np.abs(drive[:, j]) + p.get("links", 0.0) * np.abs(carried[:, j])
         elif name == "position_friction":
             out[:, j] += p.get("sin", 0.0) * np.sin(q[:, j]) + p.get("cos", 0.0) * np.cos(q[:, j])
         elif name == "stribeck":
@@ -113,6 +120,21 @@ def _tables(
     return q, qd, drive, warm, np.broadcast_to(np.asarray(time, dtype=float), q.shape)
 
 
+def of_links() -> bool:
+    """Whether `dry_friction` looks at what the links take."""
+    return any("links" in parameters for _, _, _, parameters in EFFECTS)
+
+
+def link_torques(model: Any, data: Any, dofs: ArrayLike) -> Floats:
+    """What the links take of each drive, without friction and rotors, in the state of MuJoCo's `data`, whose
+    velocities were computed, and at its accelerations. dofs: of LINKS. shape=(joints,) [Nm | N]"""
+    import mujoco
+
+    held = np.zeros(model.nv)
+    mujoco.mj_rne(model, data, 1, held)
+    return np.asarray(np.transpose(COUPLING) @ held[np.asarray(dofs)])
+
+
 def prepare(model: Any) -> Floats:
     """Sets the model's fields to those that belong to the callbacks: without them, Coulomb friction and
     damping stand for what they add. Returns which degree of freedom each joint is, shape=(joints,).
@@ -146,6 +168,7 @@ def install(
     dofs, ratios = prepare(model), np.asarray(RATIOS)
     qpos = np.array([model.joint(name).qposadr[0] for name in JOINTS])
     motors = [model.actuator(f"drive_{name}").id for name in JOINTS]
+    chain = [model.joint(name).dofadr[0] for name in LINKS] if of_links() else None
 
     def passive(m: Any, d: Any) -> None:
         if m is not model and m.signature != model.signature:
@@ -154,7 +177,8 @@ def install(
         drive = d.actuator_force[motors] + d.qfrc_applied[dofs] * ratios
         warm = REFERENCE_C if temperature is None else temperature(d)
         now = d.time if time is None else time(d)
-        m.dof_frictionloss[dofs] = dry_friction(q, qd, drive, warm, now)[0] / np.abs(ratios)
+        links = None if chain is None else link_torques(m, d, chain)
+        m.dof_frictionloss[dofs] = dry_friction(q, qd, drive, warm, now, links=links)[0] / np.abs(ratios)
         d.qfrc_passive[dofs] += smooth_torques(q, qd, drive, warm, now)[0] / ratios
 
     mujoco.set_mjcb_passive(passive)

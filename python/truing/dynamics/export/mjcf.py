@@ -32,7 +32,6 @@ from truing.dynamics.export.parts import (
     NotWritten,
     Parts,
     Reference,
-    friction_of,
     name_of,
     negative,
     rms,
@@ -141,7 +140,7 @@ def _lever(effect: Effect, link: Link, reference: Reference) -> Lever | None:
     if link.prismatic or effect[0] not in ("load_friction", "position_friction"):
         return None
     j, r = effect[1], link.ratio
-    friction = friction_of(effect, reference) / abs(r)
+    friction = reference.friction(effect) / abs(r)
     return lever_for(friction, r * reference.q[:, j], r * reference.qd[:, j])
 
 

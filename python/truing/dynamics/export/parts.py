@@ -53,6 +53,7 @@ _PARTS = {
     "viscous_law": ("quadratic", "cubic", "root", "saturating", "v0"),
     "stribeck": ("", "vs"),
     "presliding": ("", "x0"),
+    "load_friction": ("", "links"),
     "position_friction": ("sin", "cos"),
     "thermal_friction": ("coulomb", "viscous"),
     "warmup": ("coulomb", "viscous"),
@@ -118,19 +119,24 @@ class Reference:
     qd: Floats
     qdd: Floats
     torque: Floats  # shape=(n, joints) [Nm | N]: as recorded, or what the drives hold against gravity
+    links: Floats  # shape=(n, joints) [Nm | N]: what of it the links take
 
     def size(self, effect: Effect) -> float:
         """[Nm | N] root mean square of an effect of `beside`."""
-        zero = np.zeros(self.q.shape[1])
         smooth = smooth_torques(self.q, self.qd, self.torque, _WARM, _LATER, [effect])[:, effect[1]]
-        positive = dry_friction(self.q, self.qd, self.torque, _WARM, _LATER, [effect], list(zero))[
-            :, effect[1]
-        ]
-        minus = (effect[0], effect[1], effect[2], _turned(effect[3]))
-        negative = dry_friction(self.q, self.qd, self.torque, _WARM, _LATER, [minus], list(zero))[
-            :, effect[1]
-        ]
-        return rms(np.sign(self.qd[:, effect[1]]) * (positive - negative) - smooth)
+        return rms(np.sign(self.qd[:, effect[1]]) * self.friction(effect, _WARM, _LATER) - smooth)
+
+    def friction(self, effect: Effect, temperature: float = REFERENCE_C, time: float = 0.0) -> Floats:
+        """Dry friction of an effect of `beside` without its sign; below zero where it takes from that of
+        others. shape=(n,) [Nm | N]"""
+        zero = [0.0] * self.q.shape[1]
+        positive, negative = (
+            dry_friction(self.q, self.qd, self.torque, temperature, time, [one], zero, self.links)[
+                :, effect[1]
+            ]
+            for one in (effect, (*effect[:3], _turned(effect[3])))
+        )
+        return np.asarray(positive - negative)
 
 
 def _turned(parts: dict[str, float]) -> dict[str, float]:
@@ -180,10 +186,10 @@ def reference_motion(robot: _core.Robot, chain: Chain) -> Reference:
         qdd[:, j] = -reach * w * w * np.sin(phase)
     still = np.zeros_like(q)
     torque = np.asarray(_core.rigid_torques(robot, q, still, still))
-    return Reference(time, q, qd, qdd, torque)
+    return Reference(time, q, qd, qdd, torque, torque)
 
 
-def recorded_motion(robot: _core.Robot, recordings: Sequence[Recorded]) -> Reference:
+def recorded_motion(robot: _core.Robot, chain: Chain, recordings: Sequence[Recorded]) -> Reference:
     """The recordings one after the other, and the torques of the drives in them."""
     rows: list[Floats] = []
     torques: list[Floats] = []
@@ -195,7 +201,24 @@ def recorded_motion(robot: _core.Robot, recordings: Sequence[Recorded]) -> Refer
         steps.append(track.step)
     q, qd, qdd = (np.asarray(np.concatenate([table[k] for table in rows]), dtype=float) for k in range(3))
     time = float(np.median(steps)) * np.arange(len(q), dtype=np.float64)
-    return Reference(time, q, qd, qdd, np.concatenate(torques))
+    links = np.asarray(_core.rigid_torques(_bodies_only(robot, chain), q, qd, qdd))
+    return Reference(time, q, qd, qdd, np.concatenate(torques), links)
+
+
+def _bodies_only(robot: _core.Robot, chain: Chain) -> _core.Robot:
+    """The robot with the chain's bodies, and no rotors."""
+    bodies = {link.name: link.body for link in chain.links}
+    return robot.replace(
+        joints=[
+            joint.replace(
+                mass=bodies[joint.name].mass,
+                center_of_mass=bodies[joint.name].center,
+                inertia=bodies[joint.name].inertia,
+                rotor_inertia=0.0,
+            )
+            for joint in robot.joints
+        ]
+    )
 
 
 def parts_of(robot: _core.Robot, chain: Chain, reference: Reference) -> Parts:
@@ -388,7 +411,7 @@ def stand_in(effect: Effect, reference: Reference) -> StandIn:
     j = effect[1]
     if effect[0] not in ("load_friction", "viscous_law", "stribeck", "position_friction"):
         return StandIn(0.0, 0.0, reference.size(effect))
-    wanted, speed = friction_of(effect, reference), np.abs(reference.qd[:, j])
+    wanted, speed = reference.friction(effect), np.abs(reference.qd[:, j])
     columns = np.column_stack([np.ones_like(speed), speed])
     constant, slope = np.linalg.lstsq(columns, wanted, rcond=None)[0].tolist()
     mean = float(wanted.mean())
@@ -397,17 +420,6 @@ def stand_in(effect: Effect, reference: Reference) -> StandIn:
     elif slope * mean < 0.0:
         constant, slope = mean, 0.0
     return StandIn(constant, slope, rms(wanted - constant - slope * speed))
-
-
-def friction_of(effect: Effect, reference: Reference) -> Floats:
-    """Dry friction of an effect of `beside` without its sign; below zero where it takes from that of others.
-    shape=(n,) [Nm | N]"""
-    zero = [0.0] * reference.q.shape[1]
-    positive, negative = (
-        dry_friction(reference.q, reference.qd, reference.torque, REFERENCE_C, 0.0, [one], zero)[:, effect[1]]
-        for one in (effect, (*effect[:3], _turned(effect[3])))
-    )
-    return np.asarray(positive - negative)
 
 
 def stand_ins(
