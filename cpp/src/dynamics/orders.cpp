@@ -166,6 +166,7 @@ std::vector<TorqueOrder> strongest(std::vector<Line> lines) {
 std::vector<TorqueOrder> orders_left(const Problem& problem, const TorqueModel& model) {
   const Robot& robot = problem.robot;
   const double cutoff = problem.tiles.options().cutoff;
+  const Eigen::VectorXd at_rest = speeds_at_rest(robot);
   std::vector<AngleSums> sums(robot.driven_count());
   std::vector<std::pair<const Tile*, Eigen::MatrixXd>> lot(Tiles::kTogether);
   const auto add = [&](const Tile& tile, const Eigen::MatrixXd& errors) {
@@ -173,7 +174,7 @@ std::vector<TorqueOrder> orders_left(const Problem& problem, const TorqueModel& 
       const Index fine = (tile.first + i) * tile.stride;
       for (Index j = 0; j < errors.cols(); ++j) {
         const double speed = tile.motion.qd(fine, j);
-        if (tile.moving(i, j) == 0.0 || std::isnan(errors(i, j)) || std::abs(speed) < kSpeedAtRest) continue;
+        if (tile.moving(i, j) == 0.0 || std::isnan(errors(i, j)) || std::abs(speed) < at_rest[j]) continue;
         sums[static_cast<std::size_t>(j)].add(tile.motion.q(fine, j), speed, errors(i, j), cutoff);
       }
     }

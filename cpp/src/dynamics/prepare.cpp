@@ -126,6 +126,14 @@ double cutoff_of(const std::vector<Recording>& recordings, double wanted) {
   return out;
 }
 
+VectorXd speeds_at_rest(const Robot& robot) {
+  VectorXd out(static_cast<Index>(robot.driven_count()));
+  const std::vector<std::size_t> driven = robot.driven_joints();
+  for (std::size_t k = 0; k < driven.size(); ++k)
+    out[static_cast<Index>(k)] = 0.01 * (robot.joints[driven[k]].type == JointType::revolute ? 1.0 : kDrum);
+  return out;
+}
+
 void for_each_tile(const Recording& recording, std::size_t number, const Robot& robot, const PrepareOptions& options,
                    const std::function<bool(Tile&)>& use) {
   const RigidChain chain(robot);
@@ -151,7 +159,7 @@ void for_each_tile(const Recording& recording, std::size_t number, const Robot& 
     for (const auto& [from, to] : runs_of(rows.time, begin, end, last, step)) {
       if (rows.time[from] - last > kGap * step) finish();
       if (!more) return false;
-      if (!stretch) stretch = std::make_unique<Stretch>(robot.driven_count(), columns, step, options);
+      if (!stretch) stretch = std::make_unique<Stretch>(speeds_at_rest(robot), columns, step, options);
       stretch->add(rows, from, to, recording.time[0]);
       last = rows.time[to - 1];
     }

@@ -19,8 +19,11 @@
 
 namespace truing::dynamics {
 
-/// A joint whose speed [rad/s | m/s] stays below this is at rest.
-constexpr double kSpeedAtRest = 0.01;
+/// What a joint that slides moves by, where one that turns moves by a radian [m]: as on a drum of this radius.
+constexpr double kDrum = 0.1;
+
+/// A joint that has a reading and stays slower is at rest: shape=(joints,) 0.01 rad/s, or of one that slides 1 mm/s.
+Eigen::VectorXd speeds_at_rest(const Robot& robot);
 
 /// What was made of a tile and may be asked for again: it depends on nothing but what it is kept under.
 struct TileMemory {

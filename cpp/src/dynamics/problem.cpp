@@ -168,10 +168,11 @@ Problem::Problem(const Robot& given, const std::vector<Recording>& recordings, c
   range = range_of(tiles);
   range.turns = turns_of(robot);
   range.frequency = tiles.options().cutoff;
-  if (range.speed.maxCoeff() < kSpeedAtRest) {
-    throw std::invalid_argument("nothing moves: no joint of any recording is faster than " +
-                                math::number(kSpeedAtRest) + " rad/s (or m/s), and at rest friction tells nothing" +
-                                of_slow_rows(recordings));
+  if ((range.speed.array() < speeds_at_rest(robot).array()).all()) {
+    throw std::invalid_argument(
+        "nothing moves: no joint of any recording is faster than 0.01 rad/s (or 0.001 m/s), and at rest friction tells "
+        "nothing" +
+        of_slow_rows(recordings));
   }
   own_effects = options.own_effects;
   nominal = model_of(robot, *this);

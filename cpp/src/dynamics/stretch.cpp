@@ -41,19 +41,19 @@ MatrixXd measured_torque(const Recording& recording, Index begin, Index end,
 }
 
 /// 1 where the joint was faster than rest at most `window` rows away, in every `stride`-th row.
-MatrixXd moving_rows(const MatrixXd& qd, Index window, Index stride) {
+MatrixXd moving_rows(const MatrixXd& qd, const VectorXd& at_rest, Index window, Index stride) {
   const Index rows = (qd.rows() - 1) / stride + 1;
   MatrixXd out = MatrixXd::Zero(rows, qd.cols());
   for (Index c = 0; c < qd.cols(); ++c) {
     Index last_fast = -window - 1;  // sweep forwards and backwards
     std::vector<bool> fast(static_cast<std::size_t>(qd.rows()));
     for (Index i = 0; i < qd.rows(); ++i) {
-      if (std::abs(qd(i, c)) > kSpeedAtRest) last_fast = i;
+      if (std::abs(qd(i, c)) > at_rest[c]) last_fast = i;
       fast[static_cast<std::size_t>(i)] = i - last_fast <= window;
     }
     last_fast = qd.rows() + window + 1;
     for (Index i = qd.rows() - 1; i >= 0; --i) {
-      if (std::abs(qd(i, c)) > kSpeedAtRest) last_fast = i;
+      if (std::abs(qd(i, c)) > at_rest[c]) last_fast = i;
       if (i % stride == 0)
         out(i / stride, c) = fast[static_cast<std::size_t>(i)] || last_fast - i <= window ? 1.0 : 0.0;
     }
@@ -79,8 +79,12 @@ void RowWindow::drop_before(Index first) {
   begin_ += gone;
 }
 
-Stretch::Stretch(std::size_t joints, std::vector<std::string> columns, double step, const PrepareOptions& options)
-    : options_(options), joints_(static_cast<Index>(joints)), columns_(std::move(columns)), step_(step) {
+Stretch::Stretch(VectorXd at_rest, std::vector<std::string> columns, double step, const PrepareOptions& options)
+    : options_(options),
+      at_rest_(std::move(at_rest)),
+      joints_(at_rest_.size()),
+      columns_(std::move(columns)),
+      step_(step) {
   const auto every = [](double per_cutoff, double cutoff, double of) {
     return std::max<Index>(1, static_cast<Index>(1.0 / (per_cutoff * cutoff * of)));
   };
@@ -292,7 +296,7 @@ Tile Stretch::tile(Index from, Index to) const {
   const Index seen = std::max<Index>(0, from - (window + stride_ - 1) / stride_);
   const Index seen_end = std::min(motion_.end(), (to - 1) * stride_ + window + 1);
   const MatrixXd qd = motion_.rows(seen * stride_, seen_end - seen * stride_).middleCols(joints_, joints_);
-  out.moving = moving_rows(qd, window, stride_).middleRows(from - seen, to - from);
+  out.moving = moving_rows(qd, at_rest_, window, stride_).middleRows(from - seen, to - from);
   out.inside = MatrixXd::Ones(to - from, joints_);
   // A tile that is not the last one ends further from the end of what was read than this.
   const Index edge = std::min(rows_in(kEdge / cutoff_, fine_step_), motion_.end());
@@ -303,7 +307,7 @@ Tile Stretch::tile(Index from, Index to) const {
     const MatrixXd qd_there = motion_.rows(at, edge).middleCols(joints_, joints_);
     for (Index j = 0; j < joints_; ++j) {
       const double least = qd_there.col(j).minCoeff(), most = qd_there.col(j).maxCoeff();
-      if (least * most > 0.0 || std::max(-least, most) <= kSpeedAtRest) continue;  // it runs on, or rests
+      if (least * most > 0.0 || std::max(-least, most) <= at_rest_[j]) continue;  // it runs on, or rests
       out.inside.col(j).segment(first - from, near).setZero();
       out.moving.col(j).segment(first - from, near).setZero();
     }

@@ -38,8 +38,8 @@ class Stretch {
  public:
   using Use = std::function<bool(Tile&)>;
 
-  /// `step` [s] between rows; `columns`: names of the further ones.
-  Stretch(std::size_t joints, std::vector<std::string> columns, double step, const PrepareOptions& options);
+  /// at_rest: `speeds_at_rest`, of every joint; columns: names of the further ones; step: [s] between rows.
+  Stretch(Eigen::VectorXd at_rest, std::vector<std::string> columns, double step, const PrepareOptions& options);
 
   /// Rows begin to end of a recording that began at `start` [s].
   void add(const Recording& rows, Eigen::Index begin, Eigen::Index end, double start);
@@ -63,6 +63,7 @@ class Stretch {
   Tile tile(Eigen::Index from, Eigen::Index to) const;
 
   const PrepareOptions& options_;
+  Eigen::VectorXd at_rest_;  ///< [rad/s | m/s]
   Eigen::Index joints_;
   std::vector<std::string> columns_;
   double step_, fine_step_;

@@ -141,6 +141,11 @@ std::vector<std::string> unknown_torque_values(const Robot& robot) {
 
 namespace dynamics {
 
+double fastest_of(const Robot& robot, const MotionRange& range, std::size_t joint) {
+  const auto at = static_cast<Index>(joint);
+  return std::max(range.speed[at], speeds_at_rest(robot)[at]);
+}
+
 double torque_prior(const MotionRange& range, std::size_t joint) {
   return std::max(range.torque[static_cast<Eigen::Index>(joint)], 1e-3);
 }

@@ -33,6 +33,9 @@ std::string torque_unit(const Robot& robot, std::size_t joint);
 /// "rad" or "m".
 std::string angle_unit(const Robot& robot, std::size_t joint);
 
+/// [rad/s | m/s] that a joint reaches, and faster than rest.
+double fastest_of(const Robot& robot, const MotionRange& range, std::size_t joint);
+
 /// Standard deviation of a joint's torque [Nm | N], and more than nothing: what effects on it may well make.
 double torque_prior(const MotionRange& range, std::size_t joint);
 

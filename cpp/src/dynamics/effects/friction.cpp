@@ -15,8 +15,8 @@ namespace {
 
 using Eigen::Index;
 
-double per_speed(const MotionRange& range, std::size_t joint) {
-  return torque_prior(range, joint) / std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
+double per_speed(const Robot& robot, const MotionRange& range, std::size_t joint) {
+  return torque_prior(range, joint) / fastest_of(robot, range, joint);
 }
 
 auto speed(const Motion& motion, std::size_t joint) { return motion.qd.col(static_cast<Index>(joint)).array(); }
@@ -50,7 +50,7 @@ TorqueForm coulomb_with(const Robot& robot, std::size_t joint, const std::map<st
 
 std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{undirected(term_at(joint, parameter_name("viscous", robot, joint),
-                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
+                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(robot, range, joint),
                               [joint](const Motion& m, Phi phi) { phi = speed(m, joint); }))}};
 }
 
@@ -67,7 +67,7 @@ TorqueForm saturating_with(const Robot& robot, std::size_t joint, double v0, dou
 
 std::vector<TorqueForm> viscous_law(const Robot& robot, std::size_t joint, const MotionRange& range) {
   const double torque = torque_prior(range, joint);
-  const double fastest = std::max(range.speed[static_cast<Index>(joint)], kSpeedAtRest);
+  const double fastest = fastest_of(robot, range, joint);
   const std::string unit = torque_unit(robot, joint), angle = angle_unit(robot, joint);
   std::vector<TorqueForm> out;
   out.push_back(
@@ -114,7 +114,9 @@ TorqueForm stribeck_at(const Robot& robot, std::size_t joint, double vs, double 
 
 std::vector<TorqueForm> stribeck(const Robot& robot, std::size_t joint, const MotionRange& range) {
   std::vector<TorqueForm> out;
-  for (const double vs : {0.02, 0.05, 0.12, 0.3, 0.7}) {
+  const double unit = is_revolute(robot, joint) ? 1.0 : kDrum;
+  for (const double turning : {0.02, 0.05, 0.12, 0.3, 0.7}) {
+    const double vs = unit * turning;
     if (vs < 0.5 * range.speed[static_cast<Index>(joint)])
       out.push_back(stribeck_at(robot, joint, vs, torque_prior(range, joint)));
   }
@@ -140,7 +142,9 @@ TorqueForm presliding_at(const Robot& robot, std::size_t joint, double x0, doubl
 std::vector<TorqueForm> presliding(const Robot& robot, std::size_t joint, const MotionRange& range) {
   std::vector<TorqueForm> out;
   const double travel = range.upper[static_cast<Index>(joint)] - range.lower[static_cast<Index>(joint)];
-  for (const double x0 : {2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 3e-2}) {
+  const double unit = is_revolute(robot, joint) ? 1.0 : kDrum;
+  for (const double turned : {2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 3e-2}) {
+    const double x0 = unit * turned;
     if (x0 < 0.1 * travel) out.push_back(presliding_at(robot, joint, x0, torque_prior(range, joint)));
   }
   if (out.empty()) throw Unsuited("the joint travels too little");
@@ -155,7 +159,7 @@ TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map
 
 std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
   return {{undirected(term_at(joint, parameter_name("asymmetric_friction", robot, joint),
-                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(range, joint),
+                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(robot, range, joint),
                               [joint](const Motion& m, Phi phi) { phi = speed(m, joint).abs(); }))}};
 }
 

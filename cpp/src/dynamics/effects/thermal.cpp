@@ -34,7 +34,7 @@ using Factor = std::function<ArrayXd(const Motion&)>;
 TorqueForm friction_times(const char* effect, const Robot& robot, std::size_t joint, const MotionRange& range,
                           double size, const std::string& per, const Factor& factor) {
   const auto at = static_cast<Index>(joint);
-  const double torque = torque_prior(range, joint) / size, fastest = std::max(range.speed[at], kSpeedAtRest);
+  const double torque = torque_prior(range, joint) / size, fastest = fastest_of(robot, range, joint);
   const std::string unit = torque_unit(robot, joint);
   TorqueTerm coulomb =
       term_at(joint, parameter_name(effect, robot, joint, "coulomb"), unit + "/" + per, 0.3 * torque,

@@ -17,10 +17,10 @@ from truing.dynamics.sanity.grids import (
     MOVES,
     REST_WINDOW,
     SMOOTHING,
-    SPEED_AT_REST,
     STILL,
     Grid,
     gaps_of,
+    speeds_at_rest,
     usual_step,
 )
 from truing.dynamics.smoothing import acceleration_kernel, rows_within
@@ -130,10 +130,10 @@ def _smoother_if_even(time: Floats, q: Floats) -> float:
 
 
 # ---- Rest ------------------------------------------------------------------------------------------
-def at_rest(grid: Grid) -> Floats:
-    """Part of the rows in which each joint rests. shape=(joints,)"""
+def at_rest(grid: Grid, speeds: Floats) -> Floats:
+    """Part of the rows in which each joint rests. speeds: `speeds_at_rest`. shape=(joints,)"""
     window = max(1, int(round(REST_WINDOW / grid.step)))
-    fast = np.cumsum(np.abs(grid.qd) > SPEED_AT_REST, axis=0)
+    fast = np.cumsum(np.abs(grid.qd) > speeds, axis=0)
     n = len(fast)
     high = fast[np.minimum(np.arange(n) + window, n - 1)]
     low = np.vstack([np.zeros((1, fast.shape[1]), dtype=fast.dtype), fast])[
@@ -145,7 +145,8 @@ def at_rest(grid: Grid) -> Floats:
 def rest(robot: _core.Robot, grids: Sequence[Grid]) -> list[RecordingFinding]:
     """Recordings in which nothing moves, joints that never do, and rows at rest."""
     names = [joint.name for joint in driven_joints(robot)]
-    shares = {grid.name: at_rest(grid) for grid in grids if len(grid.rows)}
+    speeds = speeds_at_rest(robot)
+    shares = {grid.name: at_rest(grid, speeds) for grid in grids if len(grid.rows)}
     if not shares:
         return []
     idle = [

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truing import _core
 from truing.dynamics.recorded import OFF, measured_torque, of_all_rows, with_rows
 from truing.dynamics.sanity.findings import RecordingFinding, listed
-from truing.dynamics.sanity.grids import SPEED_AT_REST, usual_step
+from truing.dynamics.sanity.grids import speeds_at_rest, usual_step
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -58,7 +58,7 @@ def drives_off(robot: _core.Robot, usual: Floats, step: float, recording: _core.
     """
     torque = np.nan_to_num(measured_torque(robot, recording))  # where there is none, none is asked for
     size = np.abs(torque) / np.where(usual > 0.0, usual, np.inf)
-    resting = at_rest(np.asarray(recording.position), step)
+    resting = at_rest(np.asarray(recording.position), step, speeds_at_rest(robot))
     nothing = np.all(size < NOTHING, axis=1)
     out = _told(recording)
     for first, last in _runs(resting):
@@ -88,13 +88,13 @@ def _asked(size: Floats) -> bool:
     return len(size) >= FEWEST and bool(np.median(size, axis=0).max() > HELD)
 
 
-def at_rest(q: Floats, step: float) -> Bools:
-    """Rows around which no joint moves faster than noise lets one see. shape=(n,)"""
+def at_rest(q: Floats, step: float, speeds: Floats) -> Bools:
+    """Rows around which no joint moves faster than noise lets one see. speeds: shape=(joints,) shape=(n,)"""
     half = max(1, round(WINDOW / step))
     if len(q) <= 2 * half:
         return np.zeros(len(q), dtype=np.bool_)
-    moved = np.abs(q[2 * half :] - q[: -2 * half]).max(axis=1) / (2 * half * step)
-    return np.pad(moved < SPEED_AT_REST, half, mode="edge")
+    moved = np.abs(q[2 * half :] - q[: -2 * half]) / (2 * half * step)
+    return np.pad(np.all(moved < speeds, axis=1), half, mode="edge")
 
 
 def _with_drives_on(

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truing import _core
-from truing.dynamics.recorded import measured_torque
+from truing.dynamics.recorded import driven_joints, measured_torque
 from truing.dynamics.smoothing import cubics, even_times, rows_within
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-SPEED_AT_REST = 0.01  # [rad/s | m/s] as in the core: slower is noise
+SPEED_AT_REST = 0.01  # [rad/s] as in the core: slower is noise
+SLIDE_AT_REST = 0.001  # [m/s] the same of a joint that slides
 STEP = 0.008  # [s] of the grid, at least: checks need no more
 SMOOTHING = 0.1  # [s] half of the stretch whose cubic gives a smoothed value
 REST_WINDOW = 0.25  # [s] on both sides, as in the core
@@ -62,6 +63,13 @@ def gaps_of(time: Floats) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(time) > GAP * usual_step(time))
 
 
+def speeds_at_rest(robot: _core.Robot) -> Floats:
+    """shape=(joints,) [rad/s | m/s] slower than which a joint that has a reading is at rest."""
+    return np.array(
+        [SPEED_AT_REST if joint.type == "revolute" else SLIDE_AT_REST for joint in driven_joints(robot)]
+    )
+
+
 def grids_of(robot: _core.Robot, recordings: Sequence[_core.Recording]) -> list[Grid]:
     """Of the recordings that are long enough to be smoothed."""
     found = [grid_of(robot, recording) for recording in recordings]
@@ -92,7 +100,7 @@ def grid_of(robot: _core.Robot, recording: _core.Recording) -> Grid | None:
         q,
         qd,
         cubics(qd, half, step)[1],
-        cubics(np.tanh(qd / SPEED_AT_REST), half, step)[0],
+        cubics(np.tanh(qd / speeds_at_rest(robot)), half, step)[0],
         speed,
         torque,
     )

@@ -21,7 +21,7 @@ from truing import _core
 from truing.dynamics.api import PAYLOAD_COLUMNS, PAYLOAD_FOUND
 from truing.dynamics.recorded import driven_joints
 from truing.dynamics.sanity.findings import FoundParameter, RecordingFinding, listed
-from truing.dynamics.sanity.grids import SPEED_AT_REST, Grid
+from truing.dynamics.sanity.grids import Grid, speeds_at_rest
 from truing.dynamics.sanity.switched import Switched, Thinned, switched
 
 Floats = NDArray[np.float64]
@@ -265,7 +265,7 @@ def _half(robot: _core.Robot, grid: Grid, rows: NDArray[np.intp]) -> _Half:
     regressor = np.asarray(_core.torque_regressor(robot, *motion))
     rigid = np.asarray(_core.rigid_torques(robot, *motion))
     left = grid.torque[rows] - rigid
-    moving = np.abs(motion[1]) > SPEED_AT_REST  # at rest friction takes up a part of the weight
+    moving = np.abs(motion[1]) > speeds_at_rest(robot)  # at rest friction takes up a part of the weight
     parts, joints = [], []
     for j in range(left.shape[1]):
         there = ~np.isnan(left[:, j]) & moving[:, j]

@@ -281,7 +281,8 @@ class _Stretches:
         for _ in range(TURNS):
             much = self.wanted(values)[0]
             gram = np.einsum("s,sij->ij", much**2, self.gram)
-            values = np.linalg.solve(gram + RIDGE * whole, much @ self.right)
+            ridge = RIDGE * (float(np.mean(much**2)) + _TINY) * whole
+            values = np.linalg.solve(gram + ridge, much @ self.right)
             values = values / max(float(np.linalg.norm(values)), _TINY)
         return np.asarray(values)
 
