@@ -260,8 +260,9 @@ std::vector<Evidence::Gain> Search::forms_of(const Choice& choice, std::size_t a
   return out;
 }
 
-/// A form that no machine has makes way for one that machines have where this explains nearly as much; where it wins
-/// over all of these it stays, and is refused at the end: what is there is something else.
+/// Of the forms that explain about as much, one that predicts folds as well as the present one does. A form that no
+/// machine has makes way for one that machines have where this explains nearly as much; where it wins over all of these
+/// it stays, and is refused at the end: what is there is something else.
 Choice Search::in_best_form(const Choice& choice, std::size_t at, const SearchLimits& limits) const {
   const std::vector<Evidence::Gain> forms = forms_of(choice, at);
   if (forms.empty()) return choice;
@@ -274,7 +275,10 @@ Choice Search::in_best_form(const Choice& choice, std::size_t at, const SearchLi
   for (const Evidence::Gain& form : forms) {
     if (form.score < forms.front().score - limits.threshold) break;
     Choice other = in_form(form);
-    if (!limits.plausible_only || is_plausible(state(other), form.group)) return other;
+    const bool possible = !limits.plausible_only || is_plausible(state(other), form.group);
+    if (!possible) continue;
+    const bool is_present = form.group == choice.groups[at];
+    if (is_present || !predicts(squares_of_folds(other), squares_of_folds(choice), limits)) return other;
   }
   return in_form(forms.front());
 }

@@ -49,9 +49,9 @@ TorqueForm coulomb_with(const Robot& robot, std::size_t joint, const std::map<st
 }
 
 std::vector<TorqueForm> viscous(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{undirected(term_at(joint, parameter_name("viscous", robot, joint),
-                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(robot, range, joint),
-                              [joint](const Motion& m, Phi phi) { phi = speed(m, joint); }))}};
+  return {{undirected(term_at(
+      joint, parameter_name("viscous", robot, joint), torque_unit(robot, joint) + " s/" + angle_unit(robot, joint),
+      per_speed(robot, range, joint), [joint](const Motion& m, Phi phi) { phi = speed(m, joint); }))}};
 }
 
 // --- laws of the speed beside Coulomb's and the linear one
@@ -158,9 +158,10 @@ TorqueForm presliding_with(const Robot& robot, std::size_t joint, const std::map
 // --- friction that is not a function of the speed alone
 
 std::vector<TorqueForm> asymmetric(const Robot& robot, std::size_t joint, const MotionRange& range) {
-  return {{undirected(term_at(joint, parameter_name("asymmetric_friction", robot, joint),
-                              torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(robot, range, joint),
-                              [joint](const Motion& m, Phi phi) { phi = speed(m, joint).abs(); }))}};
+  return {
+      {undirected(term_at(joint, parameter_name("asymmetric_friction", robot, joint),
+                          torque_unit(robot, joint) + " s/" + angle_unit(robot, joint), per_speed(robot, range, joint),
+                          [joint](const Motion& m, Phi phi) { phi = speed(m, joint).abs(); }))}};
 }
 
 // Gears lose a part of what they carry (Hamon, Gautier and Garrec 2011): of what their motor gives, or of what their
