@@ -47,6 +47,7 @@ _FEWEST = 3  # poses
 _FARTHEST = 100.0  # [m] no robot's hand and no camera's board spread over more
 _EQUAL = 1e-9  # [m | rad] poses that differ by less are one
 _STILL = 5e-5  # [m | rad] a hand that moved by less stood still: its error is the same
+_ANY_WAY = np.array([0.36, 0.48, 0.8])  # of length one, along no axis of a robot
 _STILL_BOARD = 0.02  # [rad, and of its distance] and so did the board that a camera sees no further away
 
 # Orders of turned (intrinsic) axes: the letters from left to right are the rotations as they are multiplied.
@@ -636,14 +637,19 @@ def _first_alike(hand: Floats, board: Floats, sets: NDArray[np.int8] | None) -> 
     """Of each pose the first at which hand and board stood alike, itself if there is none."""
     first = np.arange(len(hand))
     far = np.linalg.norm(board[:, :3, 3], axis=1)
+    along = hand[:, :3, 3] @ _ANY_WAY  # hands that are near are so along any line: few are left to look at
+    order = np.argsort(along, kind="stable")
+    low, high = (np.searchsorted(along[order], along + side * _STILL) for side in (-1.0, 1.0))
     for k in range(1, len(hand)):
-        alike = (_apart(hand[:k], hand[k]) < _STILL).all(axis=1)
-        alike &= (_apart(board[:k], board[k]) < _STILL_BOARD * np.array([far[k], 1.0])).all(axis=1)
-        alike &= first[:k] == np.arange(k)
+        near = np.sort(order[low[k] : high[k]])
+        near = near[(near < k) & (first[near] == near)]
+        alike = (_apart(hand[near], hand[k]) < _STILL).all(axis=1)
+        limits = _STILL_BOARD * np.column_stack([far[near], np.ones(len(near))])
+        alike &= (_apart(board[near], board[k]) < limits).all(axis=1)
         if sets is not None:
-            alike &= sets[:k] == sets[k]
+            alike &= sets[near] == sets[k]
         if alike.any():
-            first[k] = int(np.argmax(alike))
+            first[k] = int(near[np.argmax(alike)])
     return first
 
 
