@@ -415,6 +415,19 @@ def test_torques_that_do_not_follow_the_links_have_no_scale() -> None:
     assert loads.gain_differs(fit) == []
 
 
+def test_a_factor_below_zero_is_no_scale() -> None:
+    """Where links explain next to nothing of one recording: `math domain error` before."""
+    scales = [0.02, -0.19, 0.021]
+    fit: Any = SimpleNamespace(
+        names=list("abc"),
+        loads=np.zeros((3, 4)),
+        scale=lambda k: scales[k],
+        squares_scaled=lambda k, scale: abs(scale - scales[k]),
+        squares=lambda k, load: 1.0,
+    )
+    assert loads.gain_differs(fit) == []
+
+
 def test_torques_on_the_motors_side_are_a_mistake() -> None:
     ratios = np.array([100.0, 120.0, 100.0, 60.0, 60.0, 50.0])
     checked = check_recordings(ARM, with_fields(torque=lambda one: one.torque / ratios))

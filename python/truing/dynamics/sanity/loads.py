@@ -96,7 +96,8 @@ def gain_differs(fit: Compared) -> list[RecordingFinding]:
     apart = [
         k
         for k, scale in enumerate(scales)
-        if abs(math.log(max(scale, 1e-3) / usual)) > math.log(GAIN)
+        if scale > 0.0  # a factor below zero is none: the links explain next to nothing there
+        and abs(math.log(scale / usual)) > math.log(GAIN)
         and fit.squares_scaled(k, scale) < PART * fit.squares_scaled(k, usual)
         and fit.squares_scaled(k, scale) < fit.squares(k, fit.loads[k])
     ]
