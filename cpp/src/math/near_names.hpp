@@ -26,7 +26,7 @@ inline std::size_t letters_apart(const std::string& a, const std::string& b) {
   return apart.back();
 }
 
-/// "; did you mean 'backlash'?" of the name that is nearest to `word`; nothing where none is near.
+/// " (did you mean 'backlash'?)" of the name that is nearest to `word`; nothing where none is near.
 inline std::string did_you_mean(const std::string& word, const std::vector<std::string>& names) {
   const std::string* nearest = nullptr;
   std::size_t least = 1 + word.size() / 3;  // letters
@@ -36,7 +36,7 @@ inline std::string did_you_mean(const std::string& word, const std::vector<std::
     nearest = &name;
     least = apart;
   }
-  return nearest == nullptr ? "" : "; did you mean '" + *nearest + "'?";
+  return nearest == nullptr ? "" : " (did you mean '" + *nearest + "'?)";
 }
 
 }  // namespace truing::math

@@ -129,7 +129,7 @@ TEST_CASE("every effect of the catalogue is found by its name, and a wrong name 
     CHECK(!effect.summary.empty());
     names += (names.empty() ? "" : ", ") + effect.name;
   }
-  const std::string complaint = "effect 'backlsh' does not exist; there are " + names;
+  const std::string complaint = "effect 'backlsh' does not exist (did you mean 'backlash'?); there are " + names;
   CHECK_THROWS_WITH_AS(truing::find_effect("backlsh"), complaint.c_str(), std::invalid_argument);
 }
 

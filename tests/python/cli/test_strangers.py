@@ -44,7 +44,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (
             "effects: [{effect: backlash, joints: [J1], parameters: {backlash.J2: 1e-4}}]",
             "effects[0] (backlash): effect 'backlash' has a value 'backlash.J2', which its law does not look"
-            " at; did you mean 'backlash.J1'?",
+            " at (did you mean 'backlash.J1'?)",
         ),
         (
             "torque_effects: [{effect: coulomb, joints: [J1, J2],"
