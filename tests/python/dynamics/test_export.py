@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -305,16 +307,24 @@ def test_callbacks_have_the_laws_that_mujoco_lacks(tmp_path: Path) -> None:
     assert {item["name"] for item in listed["not_written"]} == names
 
 
+@contextmanager
+def with_callbacks(effects: list[AppliedEffect], folder: Path) -> Iterator[tuple[Any, Any]]:
+    """Model and data of the arm without gravity, its callbacks installed."""
+    robot = arm("urdf").replace(torque_effects=effects, gravity=[0.0, 0.0, 0.0])
+    exported = export(robot, "mjcf", folder)
+    assert exported.callbacks is not None
+    model = mujoco.MjModel.from_xml_path(str(exported.model))
+    load(exported.callbacks).install(model)
+    try:
+        yield model, mujoco.MjData(model)
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
 def test_installed_callbacks_hold_a_loaded_joint(tmp_path: Path) -> None:
     # Friction is 0.3 of the drive's torque and 1 Nm: it holds 1.2 Nm, and not 2 Nm.
     effects = [applied("load_friction", J1=0.3), applied("coulomb", J1=1.0)]
-    robot = arm("urdf").replace(torque_effects=effects, gravity=[0.0, 0.0, 0.0])
-    exported = export(robot, "mjcf", tmp_path)
-    assert exported.callbacks is not None
-    model = mujoco.MjModel.from_xml_path(str(exported.model))
-    data = mujoco.MjData(model)
-    load(exported.callbacks).install(model)
-    try:
+    with with_callbacks(effects, tmp_path) as (model, data):
         data.ctrl[0] = 1.2
         mujoco.mj_step(model, data, 300)
         held = abs(data.qpos[0])
@@ -322,33 +332,23 @@ def test_installed_callbacks_hold_a_loaded_joint(tmp_path: Path) -> None:
         data.ctrl[0] = 2.0
         mujoco.mj_step(model, data, 300)
         assert abs(data.qpos[0]) > 20.0 * held
-    finally:
-        mujoco.set_mjcb_passive(None)
 
 
 def test_installed_callbacks_ask_mujoco_what_a_link_takes(tmp_path: Path) -> None:
-    # No gravity: a link that is pushed against 1 Nm takes what makes it faster, and not what friction holds.
+    # A link that is pushed against 1 Nm takes what makes it faster, and not what friction and rotor take.
     effects = [
         applied("load_friction", J1__links=0.3),
         applied("coulomb", J1=1.0),
         applied("armature", J1=2.0),
     ]
-    robot = arm("urdf").replace(torque_effects=effects, gravity=[0.0, 0.0, 0.0])
-    exported = export(robot, "mjcf", tmp_path)
-    assert exported.callbacks is not None
-    model = mujoco.MjModel.from_xml_path(str(exported.model))
-    data = mujoco.MjData(model)
-    load(exported.callbacks).install(model)
-    try:
+    with with_callbacks(effects, tmp_path) as (model, data):
         data.ctrl[0] = 4.0
         mujoco.mj_step(model, data, 300)
-        accelerated = data.qacc[0] * model.dof_armature[0]  # the link takes what is left of it and friction
         assert data.qfrc_constraint[0] == pytest.approx(-model.dof_frictionloss[0], rel=1e-3)
-        link = 4.0 + data.qfrc_constraint[0] + data.qfrc_passive[0] - accelerated
+        left = 4.0 + data.qfrc_constraint[0] + data.qfrc_passive[0]
+        link = left - data.qacc[0] * model.dof_armature[0]
         assert link > 0.1
         assert model.dof_frictionloss[0] == pytest.approx(1.0 + 0.3 * link, rel=1e-3)
-    finally:
-        mujoco.set_mjcb_passive(None)
 
 
 def test_a_coupling_that_acts_both_ways_is_a_tendon(tmp_path: Path) -> None:
