@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <set>
 #include <stdexcept>
 
@@ -102,16 +103,29 @@ class Builder {
   Model& model_;
 };
 
-/// Everything that the motion of `joint` moves: its own site, and those of the joints that it drives, however
-/// indirectly.
-void add_moved_sites(const Robot& robot, const std::vector<int>& own_site, std::size_t joint, double weight,
-                     std::vector<SiteWeight>* moved) {
-  moved->push_back({own_site[joint], weight});
-  for (std::size_t k = 0; k < robot.joints.size(); ++k) {
-    for (const auto& [driver, factor] : robot.joints[k].driven_by) {
-      if (driver == robot.joints[joint].name) add_moved_sites(robot, own_site, k, weight * factor, moved);
+/// By how much a joint moves for a motion of one of `joint`, however indirectly it is driven. `known`: of each joint
+/// that was asked for before; NaN: not yet.
+double moved_by(const Robot& robot, std::size_t joint, std::size_t of, std::vector<double>* known) {
+  double& out = (*known)[of];
+  if (!std::isnan(out)) return out;
+  double sum = of == joint ? 1.0 : 0.0;
+  for (const auto& [driver, factor] : robot.joints[of].driven_by) {
+    for (std::size_t k = 0; k < robot.joints.size(); ++k) {
+      if (robot.joints[k].name == driver) sum += factor * moved_by(robot, joint, k, known);
     }
   }
+  return out = sum;
+}
+
+/// Everything that the motion of `joint` moves: its own site first, then those of the joints that it drives.
+std::vector<SiteWeight> moved_sites(const Robot& robot, const std::vector<int>& own_site, std::size_t joint) {
+  std::vector<double> known(robot.joints.size(), std::numeric_limits<double>::quiet_NaN());
+  std::vector<SiteWeight> out{{own_site[joint], 1.0}};
+  for (std::size_t k = 0; k < robot.joints.size(); ++k) {
+    const double weight = moved_by(robot, joint, k, &known);
+    if (k != joint && weight != 0.0) out.push_back({own_site[k], weight});
+  }
+  return out;
 }
 
 /// The coordinate that a term's site names; a link value, base or target coordinate becomes a coordinate of its own.
@@ -268,7 +282,7 @@ Model model_of(const Robot& robot, const Measurements& data, const std::vector<E
   for (std::size_t k = 0; k < robot.joints.size(); ++k) {
     const Joint& joint = robot.joints[k];
     Coordinate coordinate;
-    add_moved_sites(robot, own_site, k, 1.0, &coordinate.sites);
+    coordinate.sites = moved_sites(robot, own_site, k);
     coordinate.offset = build.add_parameter(joint.name + ".offset", joint.type == JointType::revolute ? "rad" : "m",
                                             Role::offset, static_cast<int>(k));
     model.parameters.back().columns = {{coordinate.sites, -1, -1}};
@@ -485,6 +499,7 @@ std::vector<std::string> unknown_effect_values(const Robot& robot) {
   Robot known = robot;
   const auto is_own = [](const AppliedEffect& e) { return model::effect_or_null(e.effect, {}) == nullptr; };
   known.effects.erase(std::remove_if(known.effects.begin(), known.effects.end(), is_own), known.effects.end());
+  if (known.effects.empty()) return texts;
   try {
     const model::Model model = model::model_of(known, model::row_of_zeros(known), {});
     const std::set<std::string> values = model::effect_values(model, -1);
