@@ -49,6 +49,8 @@ _TUNED_FOR, _SETTLING = 0.04, 3.0  # [s]
 _FACTORS, _TRACKER_FACTORS = (1.0, 3.0, 10.0, 30.0, 100.0), (1.0, 3.0)
 _STATIC_TIMES = (1.0, 0.5, 0.2, 0.1)  # [s]
 _ELSEWHERE = 0.05  # [m] a receiver or tool that is farther off than this is another one
+_CERTAIN = 10.0  # standard errors, as if rows were independent, which they are not
+_ON_THE_FLANGE = 1.0  # [m] a receiver that seems to be farther off is not told by so little turning
 _TURNS = 1.5  # times the squares that have to be left without it
 _LEANING = 0.2  # [rad] gravity by the inertial sensor and by encoders: no sway, sag or bias makes so much
 _REVERSED = 2.8  # [rad] likewise: the specific force seems to have the other sign
@@ -342,7 +344,10 @@ def _check_receiver(setup: _core.TrackSetup, tracker: TrackerData, flange: Float
     found, length = fit(turning, rows)
     left, before = np.mean(length[rows] ** 2), np.mean(fit(without, rows)[1][rows] ** 2)
     elsewhere = float(np.linalg.norm(found[:3]))
-    if elsewhere > _ELSEWHERE and before > _TURNS * left:
+    A = turning[rows].reshape(-1, turning.shape[2])
+    spread = float(np.sqrt(left / 3.0 * np.trace(np.linalg.pinv(A.T @ A, 1e-12, hermitian=True)[:3, :3])))
+    told = max(_ELSEWHERE, _CERTAIN * spread) < elsewhere < _ON_THE_FLANGE  # of an arm that turns enough
+    if told and before > _TURNS * left:
         raise InputError(
             f"{tracker.path}: the receiver is {elsewhere:.2g} m from where T_flange_receiver of the set-up"
             f" has it, for the difference to the encoders turns with the flange ({before**0.5:.2g} m rms, and"
